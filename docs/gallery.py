@@ -93,6 +93,7 @@ CASES = {
     "encoder_eccentricity": Case("encoder_eccentricity:joint1:amplitude=0.0001", rate=500.0),
     "backlash": Case("backlash:joint1:width=0.004"),
     "time_delay": Case("time_delay:delay=0.012"),
+    "joint_zero": Case("joint_zero:shoulder_lift_joint:offset=0.3", UPPER_ARM),
     "joint_elasticity": Case("joint_elasticity:joint1:stiffness=2500"),
     "coupled_shaft": Case("coupled_shaft", WRIST),
     "inertia_coupling": Case(joints=WRIST, added=(_only("inertia_coupling"), Member(1, (), 2), (0.02,))),

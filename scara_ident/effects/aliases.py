@@ -13,6 +13,7 @@ import numpy as np
 import pinocchio as pin
 
 from scara_ident.arrays import Array
+from scara_ident.effects.joint_zero import JointZero, zero_columns
 from scara_ident.effects.links import point_mass, tool_of
 from scara_ident.effects.spanned import Span, random_motion, rows_by_sample
 from scara_ident.model.base_parameters import standard_regressor
@@ -23,8 +24,6 @@ from scara_ident.robot.kinematics import axis, parent
 Columns = Iterator[tuple[int | None, Array]]
 Candidates = Callable[[TorqueModel, Motion, np.random.Generator], Columns]
 
-# Shift of a joint's zero, rad or m, for a central difference: its error, the step squared, lies far below `ABSORBED`.
-ZERO_STEP = 1e-4
 # Share of a link's length for a central difference: torque is quadratic in it, so that a long step is exact.
 LENGTH_STEP = 1e-2
 
@@ -201,34 +200,15 @@ def _link_lengths(model: TorqueModel, motion: Motion, rng: np.random.Generator) 
         yield k, ((torque[0] - torque[1]) * robot.row_scale[:, None])[:, None]
 
 
-def _zero_offsets(model: TorqueModel, motion: Motion, rng: np.random.Generator) -> Columns:
-    """Give what a wrong zero of a joint does to the torque of rigid bodies, of arbitrary base parameters."""
-    term = model.rigid_body
-    value = rng.uniform(0.5, 1.5, len(term.columns))
-    rigid = np.einsum("jpn,p->jn", term.regressor(motion), value)
-    for k in range(model.robot.n):
-        torque = []
-        for step in (ZERO_STEP, -ZERO_STEP):
-            q = motion.q.copy()
-            q[k] += step
-            moved = replace(motion, q=q)
-            torque.append(np.einsum("jpn,p->jn", term.regressor(moved), value))
-        change = torque[0] - torque[1]
-        # What rounding leaves of no change at all is not a column.
-        if np.max(np.abs(change)) < 1e-12 * np.max(np.abs(rigid)):
-            change = np.zeros_like(change)
-        yield k, change[:, None]
-
-
 HIDDEN = (
     Hidden("rotor_coupling", "the rotors' inertia from a data sheet, held fixed", _rotor_couplings),
     Hidden("belt_drive_inertia", "the rotors' inertia from a data sheet, held fixed", _belt_drives),
     Hidden("constant_payload", "recordings with and without the payload", _payload),
     Hidden("link_length", "recordings with a known payload, or measuring the link", _link_lengths),
     Hidden(
-        "zero_offset",
+        JointZero.name,
         "a known payload, symmetry of the link taken as given, or a mechanical reference for the zero",
-        _zero_offsets,
+        zero_columns,
     ),
     Hidden(
         "gravity_counterbalance",

@@ -11,6 +11,7 @@ from scara_ident.effects.effect import Effect
 from scara_ident.effects.elasticity import Backlash, JointElasticity
 from scara_ident.effects.friction import AsymmetricFriction, FrictionCoupling, PositionDependentFriction, Stribeck
 from scara_ident.effects.gear import TransmissionLoss
+from scara_ident.effects.joint_zero import JointZero
 from scara_ident.effects.measurement import TimeDelay, TorqueGainMismatch, TorqueSensorNonlinearity
 from scara_ident.effects.payload import FreePayloadChange, GravityCounterbalance, PayloadChange, PayloadOfRecordings
 from scara_ident.effects.payload_intervals import PayloadInIntervals
@@ -46,6 +47,7 @@ CATALOGUE: tuple[Effect, ...] = (
     TorqueSensorNonlinearity(),
     TorqueGainMismatch(),
     TimeDelay(),
+    JointZero(),
     JointElasticity(),
     Backlash(),
     InertiaCoupling(),

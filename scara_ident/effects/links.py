@@ -15,6 +15,8 @@ from scara_ident.arrays import Array
 from scara_ident.effects.signals import Scene, Signals
 from scara_ident.model.regressor.derivative import derivative
 from scara_ident.model.regressor.kernel import RegressorKernel, build_kernel
+from scara_ident.model.regressor.recursion import joint_geometry
+from scara_ident.model.regressor.torque import trace_torque
 from scara_ident.model.terms import RigidBody
 from scara_ident.motion.motion import Motion
 from scara_ident.robot.kinematics import place_of, tool_frame
@@ -163,7 +165,22 @@ def rigid_torque(scene: Scene, motion: Motion, q: Array, v: Array, a: Array) -> 
     """Return what `Signals.rigid` gives, at other positions, velocities and accelerations, shape (n, N)."""
     term = scene.model.rigid_body
     moved = Motion(motion.name, motion.trajectory, motion.time, q, v, a, None, motion.rate)
-    return term.torque(moved, scene.value[scene.model.place(term)])
+    value = scene.value[scene.model.place(term)]
+    return _traced_torque(term, value, moved) if q.dtype == object else term.torque(moved, value)
+
+
+def _traced_torque(term: RigidBody, value: Array, motion: Motion) -> Array:
+    """Return the same where the motion is recorded expressions, of one sample."""
+    robot, back = term.robot, np.argsort(term.robot.order)
+    q, v, a = (part[back, 0].tolist() for part in (motion.q, motion.v, motion.a))
+    standard = term.standard(value)
+    bodies, armature = standard[: 10 * robot.n].reshape(-1, 10), standard[10 * robot.n :]
+    found: list[Any] = trace_torque(joint_geometry(robot.model), robot.model.gravity, bodies[back], q, v, a)
+    rows = [
+        found[int(place)] + rotor * motion.a[j, 0]
+        for j, (place, rotor) in enumerate(zip(robot.order, armature, strict=True))
+    ]
+    return np.array([[scale * row] for scale, row in zip(robot.row_scale.tolist(), rows, strict=True)], dtype=object)
 
 
 def rigid_slopes(signals: Signals, joint: int) -> tuple[Array, Array, Array]:

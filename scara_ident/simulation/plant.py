@@ -116,6 +116,8 @@ class PlantDraft:
         Rate of the recorded torque's offset, N m/s.
     shift : ndarray, shape (n,)
         Offset of the recorded torque that the drive does not give, N m.
+    zero : ndarray, shape (n,)
+        Position of the joint less that recorded, rad or m.
     pickup : list of (int, float, float, float)
         Joint, order per joint turn, amplitude and phase of a ripple that only the torque sensor sees.
     """
@@ -130,10 +132,11 @@ class PlantDraft:
     cubic: Array
     drift: Array
     shift: Array
+    zero: Array
     pickup: list[tuple[int, float, float, float]]
 
     def array(self, name: str) -> Array:
-        """Return an array of the plant, or of the torque's measurement."""
+        """Return an array of the plant, or of the measurement."""
         return self.arrays[name] if name in self.arrays else np.asarray(getattr(self, name))
 
     def carry(self, body: Array, span: Array) -> None:
@@ -207,5 +210,6 @@ def empty_draft(n: int, scale: Array, reduction: Array) -> PlantDraft:
         cubic=zero.copy(),
         drift=zero.copy(),
         shift=zero.copy(),
+        zero=zero.copy(),
         pickup=[],
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -189,12 +189,14 @@ def simulate(
     # The name takes part, so that no two trajectories share their noise.
     random = np.random.default_rng([seed, repetition, zlib.crc32(motion.name.encode())])
     draft.sensors["shift"] = random.uniform(size=arm.robot.n)[back]
-    start = torque_at_start(moved, wanted, loaded_bodies(moved, own))
+    zero = draft.zero[arm.robot.order, None]
+    # The controller knows the recorded position only.
+    reached = replace(wanted, position=wanted.position + zero)
+    start = np.zeros(arm.robot.n) if feed is not None else torque_at_start(moved, reached, loaded_bodies(moved, own))
     added = np.zeros((arm.robot.n, len(wanted.time))) if feed is None else np.asarray(feed, dtype=float)
-    start = start if feed is None else np.zeros(arm.robot.n)
     if added.shape != wanted.position.shape:
         raise UsageError(f"feed has shape {added.shape}; expected {wanted.position.shape}, a column per tick")
-    position, velocity = wanted.position[back], wanted.velocity[back]
+    position, velocity = reached.position[back], reached.velocity[back]
     steps = max(least_substeps, _needed_substeps(moved, draft, control)) if substeps is None else substeps
     measured, seen, true, stops = _run(
         moved, draft, control, steps, np.stack([position.T, velocity.T]),
@@ -213,7 +215,7 @@ def simulate(
         repetition=repetition,
         joints=arm.robot.joints,
         time=wanted.time,
-        position=np.ascontiguousarray(measured[:, ::ticks]),
+        position=np.ascontiguousarray(measured[:, ::ticks] - zero),
         effort=effort,
         velocity=np.ascontiguousarray(seen[:, ::ticks]) if record_velocity else None,
         link_position=_link_position(arm, true, link_encoders, [seed, repetition, zlib.crc32(name.encode())]),

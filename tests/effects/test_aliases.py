@@ -24,7 +24,7 @@ def test_the_scara_absorbs_what_the_founding_equations_say():
     assert known["rotor_coupling"].joints == ("joint2",)
     assert known["constant_payload"].absorbed_by == ("P_d1", "P_d2", "P_d4")
     assert known["link_length"].absorbed_by == ("P_d1", "P_d2", "P_d3")
-    assert known["zero_offset"].absorbed_by == ("P_d2", "P_d3")
+    assert known["joint_zero"].absorbed_by == ("P_d2", "P_d3")
     assert known["asymmetric_coulomb"].absorbed_by == ("p_o1", "p_o2")
     assert known["aerodynamic_drag"].absorbed_by == ("a21", "a22")
     assert known["iron_loss"].absorbed_by == ("a01", "a11", "a02", "a12")
@@ -37,21 +37,21 @@ def test_a_model_with_fewer_parameters_absorbs_less():
     # No offset; no P_d3, so that the second link's zero shows. The first joint's never does: nothing depends on it.
     assert "asymmetric_coulomb" not in reduced
     assert "link_length" not in reduced
-    assert reduced["zero_offset"].joints == ("joint1",)
-    assert reduced["zero_offset"].absorbed_by == ()
+    assert reduced["joint_zero"].joints == ("joint1",)
+    assert reduced["joint_zero"].absorbed_by == ()
     assert "aerodynamic_drag" not in found(load_robot(), "basic")
 
 
 def test_known_gravity_opens_the_length_of_a_link(tmp_path: Path):
     planar = found(load_robot(write_urdf(tmp_path / "arm.urdf", PLANAR_2R)))
     assert "link_length" not in planar
-    assert "zero_offset" in planar
+    assert "joint_zero" in planar
 
 
 def test_rotors_on_links_of_any_arm_are_absorbed_by_the_inertias_of_links():
     arm = found(load_robot(example_urdf("ur5_robot.urdf")), "basic")
     assert len(arm["rotor_coupling"].joints) == 5
-    assert set(arm["zero_offset"].joints) == {"shoulder_pan_joint", "wrist_3_joint"}
+    assert set(arm["joint_zero"].joints) == {"shoulder_pan_joint", "wrist_3_joint"}
 
 
 @pytest.mark.parametrize(

@@ -20,6 +20,7 @@ from scara_ident.simulation.effects.friction import (
 )
 from scara_ident.simulation.effects.sensors import (
     EncoderEccentricity,
+    JointZero,
     OffsetDrift,
     TimeDelay,
     TorqueGainMismatch,
@@ -52,7 +53,7 @@ CATALOGUE: tuple[type[Effect], ...] = (
     Vibration,
 )
 # What an arm may have or meet beside them.
-OTHERS: tuple[type[Effect], ...] = (Push, Payload, CoupledShaft)
+OTHERS: tuple[type[Effect], ...] = (Push, Payload, CoupledShaft, JointZero)
 UNLISTED: tuple[type[Effect], ...] = (UnlistedSignedSine, UnlistedSwingingViscous)
 EFFECTS: dict[str, type[Effect]] = {effect.name: effect for effect in (*CATALOGUE, *OTHERS, *UNLISTED)}
 

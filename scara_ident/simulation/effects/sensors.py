@@ -103,3 +103,20 @@ class EncoderEccentricity(Effect):
         draft.sensors["eccentricity"][j] = self.amplitude
         draft.sensors["eccentricity_order"][j] = self.order * draft.reduction[j]
         draft.sensors["eccentricity_phase"][j] = self.phase
+
+
+@dataclass(frozen=True)
+class JointZero(Effect):
+    """A position with another zero than the URDF's: the joint stands ``offset`` further than is recorded.
+
+    The controller works with the recorded position, so that the arm follows the reference as far off.
+    """
+
+    name: ClassVar[str] = "joint_zero"
+    units: ClassVar[dict[str, str]] = {"offset": "rad"}
+    arrays: ClassVar[dict[str, str]] = {"offset": "zero"}
+    offset: float = 0.05
+
+    def first_choice(self, arm: VirtualArm) -> str:
+        """Take the second joint: of no arm with a vertical first axis the torque depends on where that points."""
+        return arm.robot.joints[min(1, arm.robot.n - 1)]

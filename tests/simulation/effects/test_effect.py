@@ -36,6 +36,7 @@ NOTHING = [
     fx.TorqueGainMismatch(ratio=1.0),
     fx.Backlash(width=0.0),
     fx.EncoderEccentricity(amplitude=0.0),
+    fx.JointZero(offset=0.0),
     fx.FrictionCoupling(viscous=0.0, coulomb=0.0),
     fx.OffsetDrift(rate=0.0),
     fx.Vibration(amplitude=0.0),
@@ -148,5 +149,5 @@ def test_any_mix_of_effects_leaves_the_arm_on_its_way(seed: int) -> None:
         ]
         motion = swing(arm.robot, 1.0, amplitude=float(random.choice([0.002, 0.3])))
         result = simulate(arm, motion, effects=chosen)
-        assert np.abs(result.true.position - motion.position).max() < 0.05
+        assert np.abs(result.recording.position - motion.position).max() < 0.05
         assert result.stops < 200

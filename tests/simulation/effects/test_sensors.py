@@ -58,3 +58,16 @@ def test_encoder_eccentricity_is_in_the_measured_position() -> None:
     np.testing.assert_array_equal(result.recording.position[1], q[1])
     assert np.nanmax(np.abs(left_over(result.arm, result.true))) < 1e-10
     assert np.abs(q - run().true.position).max() > 1e-6
+
+
+@pytest.mark.parametrize("offset", [0.07, -1.5])
+def test_a_joint_of_another_zero_moves_as_recorded_that_far_off(offset: float) -> None:
+    plain, result = run(), run(fx.JointZero("joint2", offset))
+    q = result.true.position
+    np.testing.assert_allclose(result.recording.position[1], q[1] - offset, atol=1e-15)
+    np.testing.assert_array_equal(result.recording.position[0], q[0])
+    assert np.nanmax(np.abs(left_over(result.arm, result.true))) < 1e-10
+    # It starts on the reference as any arm does, at the torque that this takes there.
+    error = np.abs(result.recording.position - result.motion.position).max(axis=1)
+    assert np.all(error < 3.0 * np.abs(plain.recording.position - plain.motion.position).max(axis=1))
+    assert np.abs(result.true.effort - plain.true.effort).max() > 1e-3
