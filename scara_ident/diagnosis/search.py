@@ -242,6 +242,9 @@ def _searched(
             if swap is None:
                 break
             winner, state = swap.decision, replace(state.giving_way(swap.place), scene=swap.scene)
+        if winner.candidate.corrects_data:
+            # The search goes on with other columns: what these keep to save time is not held beside them.
+            before = replace(before, columns=before.columns.beside(before.columns.observations))
         passed = (*passed, (winner.label, before))
         state = state.with_effect(winner)
     if state.correction is not None:
