@@ -15,6 +15,7 @@ from scara_ident.diagnosis.choice import choose
 from scara_ident.diagnosis.correction import Correction
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
 from scara_ident.diagnosis.exchange import best_exchange, needed
+from scara_ident.diagnosis.interval_fit import refined
 from scara_ident.diagnosis.lines import line_candidates
 from scara_ident.diagnosis.nonlinear_fit import tune
 from scara_ident.diagnosis.search_state import SearchState, Step
@@ -168,9 +169,8 @@ def search(task: SearchTask, columns: CandidateColumns, *, known: Search | None 
     task.progress(f"making the columns of {len(candidates)} candidates", 0.0)
     columns.rows(scene, candidates)
     tried = max(1, len(candidates))
-    state = SearchState(
-        columns, scene, start.weights, start.offsets, start.value, pool, candidates, tried, task.criteria
-    )
+    step = SelectionStep(scene, columns, (), start.weights, tried, task.criteria, start.offsets)
+    state = SearchState(step, start.value, pool, candidates)
     return _searched(task, _Base(start, observations, scene), state, known, frozenset(), ())
 
 
@@ -187,9 +187,8 @@ def search_again(task: SearchTask, found: Search, without: Collection[str]) -> S
     place = next((k for k, (label, _) in enumerate(found.passed) if label in without), 0)
     state = found.passed[place][1]
     state = state.with_more([item for item in _beginnings(found) if item not in state.pool])
-    taken = {*without, *(item.label(state.scene) for item in state.chosen)}
     base = _Base(found.start, found.uncorrected, found.first)
-    return _searched(task, base, state.only(taken), found, frozenset(without), found.passed[:place])
+    return _searched(task, base, state.only({*without, *state.labels}), found, frozenset(without), found.passed[:place])
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,51 +211,46 @@ def _searched(
     """Let in one effect after another until none is left that helps."""
     criteria, near = task.criteria, None if known is None else known.step
     while True:
-        chosen = state.chosen
+        step, scene, chosen = state.step, state.step.scene, state.step.chosen
         words = f"trying {len(state.candidates)} candidates" + (f" beside {len(chosen)} found" if chosen else "")
         task.progress(words, after_rounds(len(passed)))
-        state.columns.forget_all_but(base.first, state.scene)
-        step = state.step()
+        step.columns.forget_all_but(base.first, scene)
         decisions = step.judge(state.candidates, base.first)
-        residuals = Residuals(step.observations.data, state.columns.predicted(state.scene, chosen, state.value))
-        seeds = line_candidates(state.scene, residuals, task.catalogue, criteria)
-        taken = {*without, *(item.label(state.scene) for item in chosen)}
-        decisions += step.judge([item for item in seeds if item.label(state.scene) not in taken])
-        winner, refused, scene = None, dict[str, Decision](), state.scene
+        residuals = Residuals(step.observations.data, step.columns.predicted(scene, chosen, state.value))
+        seeds = line_candidates(scene, residuals, task.catalogue, criteria)
+        taken = {*without, *state.labels}
+        decisions += step.judge([item for item in seeds if item.label(scene) not in taken])
+        winner, refused = None, dict[str, Decision]()
         if len(state.steps) < criteria.most_effects:
             winner, refused, scene = choose(step, decisions, near)
             if winner is None and chosen != state.asked:
                 # What came in may have hidden when something acts.
-                more = [item for item in _in_intervals(task.catalogue, state) if item.label(state.scene) not in taken]
+                more = [item for item in _in_intervals(task.catalogue, state) if item.label(scene) not in taken]
                 state = replace(state.with_more(more), asked=chosen)
-                step = state.step() if more else step
-                found = step.judge(more)
-                winner, unsound, scene = choose(step, found, near)
+                found = state.step.judge(more)
+                winner, unsound, scene = choose(state.step, found, near)
                 decisions, refused = decisions + found, refused | unsound
         decisions = [item for item in decisions if item.label not in refused] + list(refused.values())
-        before, state = state, replace(state, scene=scene)
+        before, state = state, state.at(scene)
         if winner is None:
             # Each explains more than what it replaces, or as much with fewer: there is an end, and this is one in any case.
             free = state.exchanges < len(state.steps)
-            swap = best_exchange(step, state.pool, base.first, (*without, *refused)) if free else None
+            swap = best_exchange(state.step, state.pool, base.first, (*without, *refused)) if free else None
             if swap is None:
                 break
-            winner, state = swap.decision, replace(state.giving_way(swap.place), scene=swap.scene)
-        if winner.candidate.corrects_data:
-            # The search goes on with other columns: what these keep to save time is not held beside them.
-            before = replace(before, columns=before.columns.beside(before.columns.observations))
-        passed = (*passed, (winner.label, before))
+            winner, state = swap.decision, state.giving_way(swap.place).at(swap.scene)
+        passed = (*passed, (winner.label, before.to_go_back_to(winner)))
         state = state.with_effect(winner)
     if state.correction is not None:
         # What came in since had moved it.
         state = state.corrected(state.correction.candidate)
-    state = replace(state, chosen=needed(state.step())).tuned()
-    labels = {item.label(state.scene) for item in state.chosen}
+    step = refined(tune(replace(state.step, chosen=needed(state.step))))
+    labels = {item.label(step.scene) for item in step.chosen}
     stayed = [item for item in state.steps if item.decision.label in labels or item.decision.candidate.corrects_data]
     others = [Candidate(effect, member) for effect in task.catalogue for member in effect.doubtful(base.first)]
-    doubtful = tuple(item for item in others if item.label(state.scene) not in labels)
+    doubtful = tuple(item for item in others if item.label(step.scene) not in labels)
     return Search(
-        state.step(),
+        step,
         base.uncorrected,
         base.start,
         tuple(stayed),
@@ -271,18 +265,19 @@ def _searched(
 def _in_intervals(catalogue: Sequence[Effect], state: SearchState) -> list[Candidate]:
     """Return effects that act in intervals of recordings, as they are seen with those found taken off the torque."""
     families = [effect for effect in catalogue if effect.in_intervals]
-    if not families or any(item.effect.in_intervals for item in state.chosen):
+    step, value = state.step, state.value
+    if not families or any(item.effect.in_intervals for item in step.chosen):
         return []
-    observations, scene, value = state.columns.observations, state.scene, state.value
+    observations = step.observations
     start = observations.parameters
-    whole = state.columns.predicted(scene, state.chosen, value)
+    whole = step.columns.predicted(step.scene, step.chosen, value)
     parts = zip(whole, observations.predicted(value[:start]), strict=True)
     left = {
         replace(motion, torque=motion.torque - (own - base)): held
         for (motion, held), (own, base) in zip(columns_at_hand(observations).items(), parts, strict=True)
         if motion.torque is not None
     }
-    beside = replace(scene, columns=left)
+    beside = replace(step.scene, columns=left)
     return [Candidate(effect, member) for effect in families for member in effect.members(beside)]
 
 
