@@ -210,6 +210,8 @@ def _searched(
 ) -> Search:
     """Let in one effect after another until none is left that helps."""
     criteria, near = task.criteria, None if known is None else known.step
+    # The fit that a step keeps goes with it: who asked for the search holds another.
+    state = replace(state, step=replace(state.step))
     while True:
         step, scene, chosen = state.step, state.step.scene, state.step.chosen
         words = f"trying {len(state.candidates)} candidates" + (f" beside {len(chosen)} found" if chosen else "")
@@ -227,20 +229,21 @@ def _searched(
                 # What came in may have hidden when something acts.
                 more = [item for item in _in_intervals(task.catalogue, state) if item.label(scene) not in taken]
                 state = replace(state.with_more(more), asked=chosen)
-                found = state.step.judge(more)
-                winner, unsound, scene = choose(state.step, found, near)
+                step = state.step
+                found = step.judge(more)
+                winner, unsound, scene = choose(step, found, near)
                 decisions, refused = decisions + found, refused | unsound
         decisions = [item for item in decisions if item.label not in refused] + list(refused.values())
-        before, state = state, state.at(scene)
+        gone = None
         if winner is None:
             # Each explains more than what it replaces, or as much with fewer: there is an end, and this is one in any case.
             free = state.exchanges < len(state.steps)
-            swap = best_exchange(state.step, state.pool, base.first, (*without, *refused)) if free else None
+            swap = best_exchange(step, state.pool, base.first, (*without, *refused)) if free else None
             if swap is None:
                 break
-            winner, state = swap.decision, state.giving_way(swap.place).at(swap.scene)
-        passed = (*passed, (winner.label, before.to_go_back_to(winner)))
-        state = state.with_effect(winner)
+            winner, scene, gone = swap.decision, swap.scene, swap.place
+        passed = (*passed, (winner.label, state.to_go_back_to(winner)))
+        state = (state if gone is None else state.giving_way(gone)).at(scene).with_effect(winner)
     if state.correction is not None:
         # What came in since had moved it.
         state = state.corrected(state.correction.candidate)
