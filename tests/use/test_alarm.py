@@ -8,20 +8,13 @@ import pytest
 from scara_ident.errors import RecordingError
 from scara_ident.estimation.tail import clusters
 from scara_ident.use.alarm import calibrate, residual_scale
-from scara_ident.use.external_torque import FEATURES, Observed
-
-RATE = 20.0
+from scara_ident.use.external_torque import Observed
+from tests.use.residuals import residual
 
 
 def noise(seed: int, seconds: float = 600.0) -> Observed:
-    """Two joints of white noise of heavy tail, three times as large on the first while it is slow."""
-    rng, count = np.random.default_rng(seed), round(seconds * RATE)
-    time = np.arange(count) / RATE
-    slow = np.sin(0.3 * time) > 0.0
-    features = np.zeros((2, len(FEATURES), count))
-    features[:, 3, :], features[:, 4, :] = slow, ~slow
-    size = np.array([np.where(slow, 3.0, 1.0), np.full(count, 0.1)])
-    return Observed(f"n{seed}", time, np.zeros((2, count)), size * rng.laplace(size=(2, count)), features, time > 1.0)
+    """Two joints of white noise of heavy tail."""
+    return residual(seed, lambda rng, shape: rng.laplace(size=shape), seconds)
 
 
 def test_the_scale_follows_the_features():

@@ -7,20 +7,14 @@ import pytest
 
 from scara_ident.use.external_torque import FEATURES, Observed
 from scara_ident.use.residual_scatter import residual_scatter
+from tests.use.residuals import residual
 
-RATE = 20.0
+HALF = np.linalg.cholesky([[1.0, 0.6], [0.6, 1.0]])
 
 
-def correlated(seed: int, seconds: float = 600.0) -> Observed:
-    """Two joints of correlated noise, three times as large on the first while it is slow."""
-    rng, count = np.random.default_rng(seed), round(seconds * RATE)
-    time = np.arange(count) / RATE
-    slow = np.sin(0.3 * time) > 0.0
-    features = np.zeros((2, len(FEATURES), count))
-    features[:, 3, :], features[:, 4, :] = slow, ~slow
-    size = np.array([np.where(slow, 3.0, 1.0), np.full(count, 0.1)])
-    noise = np.linalg.cholesky([[1.0, 0.6], [0.6, 1.0]]) @ rng.standard_normal((2, count))
-    return Observed(f"n{seed}", time, np.zeros((2, count)), size * noise, features, time > 1.0)
+def correlated(seed: int) -> Observed:
+    """Two joints of correlated noise."""
+    return residual(seed, lambda rng, shape: HALF @ rng.standard_normal(shape), 600.0)
 
 
 @pytest.mark.parametrize(("state", "size"), [(3, (3.0, 0.1)), (4, (1.0, 0.1))])
