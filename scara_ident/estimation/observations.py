@@ -250,7 +250,8 @@ def observe(model: TorqueModel, data: PreparedData, known: Observations | None =
         else {_key(item.data.recordings[0]): item for item in known.each}
     )
     items = [held[_key(item)].data.recordings[0] if _key(item) in held else item for item in data.recordings]
-    data = replace(data, recordings=tuple(items))
+    if held:
+        data = replace(data, recordings=tuple(items))
 
     def of_recording(item: PreparedRecording) -> tuple[tuple[Raw, ...], Sequence[JointRows]]:
         same = held.get(_key(item))

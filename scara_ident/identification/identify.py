@@ -34,12 +34,13 @@ from scara_ident.identification.recording_check import held_out_events
 from scara_ident.identification.usable import check_rows, usable_in_bands
 from scara_ident.manners import Saved, several
 from scara_ident.model.model import TorqueModel
+from scara_ident.motion.position_noise import noise_sizes
 from scara_ident.motion.repeatability import repeatability
 from scara_ident.progress import Tell, Work, log_notes, silent
 from scara_ident.recording.recording import Recording
 from scara_ident.recording.shared_samples import shared_samples
 from scara_ident.robot.robot import Robot
-from scara_ident.threads import side_by_side
+from scara_ident.threads import one_thread, side_by_side
 
 _LOG = logging.getLogger(__name__)
 
@@ -123,8 +124,9 @@ class Identification(Saved, told_by="identification"):
         return self._errors(self.validation)
 
     def _errors(self, observations: Observations) -> dict[str, tuple[JointError | None, ...]]:
-        each = observations.each
-        return dict(zip([item.name for item in each], side_by_side(self.estimate.errors, each), strict=True))
+        # One after the other: each is so short that two threads would only hand the interpreter's lock over.
+        with one_thread():
+            return {item.name: self.estimate.errors(item) for item in observations.each}
 
 
 def identify(
@@ -210,10 +212,14 @@ def identify(
     progress("looking for events", 0.6)
     # With a wrong sign or exchanged joints nothing is explained anywhere.
     robust = None if faults else robust_fit(training)
-    # Both look at samples alone, so that they go side by side.
-    (events, noise) = side_by_side(
+    # All look at samples alone, so that they go side by side; the estimators ask for the noise of positions.
+    (events, noise, _) = side_by_side(
         lambda work: work(),
-        [lambda: () if robust is None else find_events(training, robust.value), lambda: repeatability(data)],
+        [
+            lambda: () if robust is None else find_events(training, robust.value),
+            lambda: repeatability(data),
+            lambda: noise_sizes(data),
+        ],
     )
     steady = None if robust is None else robust.value
     training, events, more = with_all_samples(training, events, steady, Work(progress, 0.6, 0.7))

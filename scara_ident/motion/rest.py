@@ -53,10 +53,14 @@ def standstill(stretch: Stretch, motion: Motion, bands: Bands) -> NDArray[np.boo
         few = band is not None and stretch.rate < FEW_SAMPLES * band
         if not len(turns) or (cut is None and not few):
             continue
-        widen, fast = _widening(REST_WIDEN, stretch.rate, band), a if few else a - low_pass(a, stretch.rate, band)
-        for around in (slice(max(0, turn - widen), turn + widen + 1) for turn in turns):
-            if few or np.ptp(fast[around]) > SHARP * np.max(np.abs(a[around])):
-                own[around] = True
+        widen = _widening(REST_WIDEN, stretch.rate, band)
+        # Beyond an end its own sample again, which widens no range.
+        around = np.clip(turns[:, None] + np.arange(-widen, widen + 1), 0, len(v) - 1)
+        if not few:
+            fast = (a - low_pass(a, stretch.rate, band))[around]
+            sharp = np.ptp(fast, axis=1) > SHARP * np.max(np.abs(a[around]), axis=1)
+            around = around[sharp]
+        own[around] = True
     return found
 
 

@@ -330,3 +330,11 @@ def test_the_factors_alone_are_those_of_the_rows(model: TorqueModel, one: Record
     for found, wanted in zip(informations(model, data), observe(model, data).by_joint, strict=True):
         assert_same(found, wanted)
     assert all(information.rows == 0.0 for information in informations(model, prepare([], BANDS)))
+
+
+def test_observations_hold_the_data_that_they_were_made_of(model: TorqueModel, one: Recording):
+    """What is kept by the data, as the noise of positions, is then found by its observations too."""
+    data = prepare([one], BANDS)
+    observations = observe(model, data)
+    assert observations.data is data
+    assert observe(model, data, known=observations).data.recordings == data.recordings
