@@ -11,7 +11,7 @@ from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.correction import taken_out
 from scara_ident.diagnosis.criteria import SelectionCriteria
-from scara_ident.diagnosis.effect_parameters import parameters_beside
+from scara_ident.diagnosis.effect_parameters import parameters_beside, told_size
 from scara_ident.diagnosis.noise_check import noise_objection
 from scara_ident.diagnosis.nonlinear_fit import tune
 from scara_ident.diagnosis.remainder_check import remainder_objection
@@ -222,9 +222,6 @@ def _insignificant(step: SelectionStep, candidate: Candidate) -> str | None:
     """Say so where the size of an effect is within its uncertainty, that of its nonlinear parameters included."""
     if not candidate.effect.nonlinear:
         return None
-    nonlinear = {parameter.name for parameter in candidate.effect.nonlinear}
-    found = parameters_beside(step, candidate)
-    sizes = [parameter for name, parameter in found.items() if name not in nonlinear and name != "phase"]
-    if any(abs(parameter.value) > step.criteria.least_size * parameter.std for parameter in sizes):
+    if told_size(candidate.effect, parameters_beside(step, candidate), step.criteria.least_size):
         return None
     return "its size is within its uncertainty once its other parameters are free"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,7 +14,7 @@ from scara_ident.diagnosis.candidates import Candidate, Rows
 from scara_ident.diagnosis.nonlinear_fit import Linearised, linearise, tune
 from scara_ident.diagnosis.selection_step import SelectionStep
 from scara_ident.diagnosis.unknowns import sides
-from scara_ident.effects import Parameter, Scene
+from scara_ident.effects import Effect, Parameter, Scene
 from scara_ident.estimation.covariance import block_covariance
 from scara_ident.estimation.information import merge
 from scara_ident.estimation.noise_bias import NEGLIGIBLE, noise_shares
@@ -73,6 +74,13 @@ class PhysicalParameters:
     effects: tuple[dict[str, Parameter], ...]
     coefficients: tuple[Coefficients, ...]
     rotors: tuple[RotorInertia, ...]
+
+
+def told_size(effect: Effect, parameters: Mapping[str, Parameter], stds: float) -> bool:
+    """Whether any of an effect's sizes, its nonlinear parameters left aside, is so many standard deviations from none."""
+    others = {"phase", *(parameter.name for parameter in effect.nonlinear)}
+    sizes = [parameter for name, parameter in parameters.items() if name not in others]
+    return any(abs(size.value) > stds * size.std for size in sizes)
 
 
 def physical_parameters(step: SelectionStep, *, scatter_alone: bool = False) -> PhysicalParameters:

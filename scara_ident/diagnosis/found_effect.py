@@ -9,7 +9,7 @@ import numpy as np
 
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.confounding import Confounder, confounders
-from scara_ident.diagnosis.effect_parameters import Coefficients, PhysicalParameters
+from scara_ident.diagnosis.effect_parameters import Coefficients, PhysicalParameters, told_size
 from scara_ident.diagnosis.held_out_gain import HeldOutGain
 from scara_ident.diagnosis.search import Search
 from scara_ident.diagnosis.selection_step import SelectionStep
@@ -40,6 +40,9 @@ class FoundEffect:
         Those of its parameters that a channel of its own, as of a second encoder, tells without this fit.
     held_out : HeldOutGain or None
         What it changes on recordings that no choice has seen; None where there are none in which it acts.
+    size_told : bool
+        Whether its size differs from none with all that is unsure about it, such as the law that it follows. That it is
+        there is told by what it removes, whatever that law.
     """
 
     effect: str
@@ -55,6 +58,7 @@ class FoundEffect:
     candidate: Candidate | None = None
     direct: Mapping[str, Parameter] = field(default_factory=dict)
     held_out: HeldOutGain | None = None
+    size_told: bool = True
 
     @property
     def label(self) -> str:
@@ -150,6 +154,7 @@ def found_effects(
                 None if candidate.corrects_data else candidate,
                 readings.get((candidate.effect.name, candidate.joint(scene)), {}),
                 held_out.get(candidate.label(scene)),
+                told_size(candidate.effect, values, found.step.criteria.least_size),
             )
         )
         before = now

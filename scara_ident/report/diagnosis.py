@@ -66,6 +66,7 @@ def diagnosis_dict(diagnosis: Diagnosis, worth: Mapping[str, Any] | None = None)
                 "description": effect.description,
                 "parameters": {name: dict(vars(parameter)) for name, parameter in effect.parameters.items()},
                 "intervals": intervals(effect, diagnosis),
+                "size_told": effect.size_told,
                 "direct": {name: dict(vars(parameter)) for name, parameter in effect.direct.items()},
                 "confounded_with": list(dict.fromkeys(confounder.effect for confounder in effect.confounded_with)),
                 "confounders": [
@@ -305,7 +306,8 @@ def _found(effect: FoundEffect, diagnosis: Diagnosis) -> list[str]:
     """Say what an effect is and how large, and what the recordings held out show of it."""
     gain, criteria = effect.held_out, diagnosis.search.step.criteria
     values = ", ".join(quantity(name, parameter) for name, parameter in effect.parameters.items())
-    said = f"{effect.title}: {effect.description}; {values}"
+    unsure = "" if effect.size_told else ", so that it is there is told, but not how large it is"
+    said = f"{effect.title}: {effect.description}; {values}{unsure}"
     if gain is None:
         return [f"Found {said}."]
     if gain.borne_out(criteria):

@@ -10,9 +10,15 @@ import pytest
 from numpy.typing import NDArray
 
 from scara_ident.diagnosis.candidates import Candidate
-from scara_ident.diagnosis.effect_parameters import Coefficients, _told, parameters_beside, physical_parameters
+from scara_ident.diagnosis.effect_parameters import (
+    Coefficients,
+    _told,
+    parameters_beside,
+    physical_parameters,
+    told_size,
+)
 from scara_ident.diagnosis.selection_step import SelectionStep
-from scara_ident.effects import Member
+from scara_ident.effects import Member, Parameter
 from scara_ident.effects.coupling import DriveCoupling
 from scara_ident.effects.friction import Stribeck
 from scara_ident.effects.gear import TransmissionLoss
@@ -151,3 +157,9 @@ def test_the_deviation_of_a_coefficient_holds_what_the_noise_of_positions_does()
 def test_coefficients_are_at_least_what_their_uncertainty_leaves():
     own = Coefficients(np.array([5.0, -5.0, 1.0]), np.diag([1.0, 4.0, 1.0]))
     np.testing.assert_allclose(own.at_least(2.0), [3.0, -1.0, 0.0])
+
+
+@pytest.mark.parametrize(("std", "told"), [(0.01, True), (0.03, False)])
+def test_a_size_is_told_where_it_differs_from_none_whatever_the_other_parameters(std: float, told: bool):
+    parameters = {"amplitude": Parameter(AMPLITUDE, std, "N m"), "velocity": Parameter(VELOCITY, 0.01, "rad/s")}
+    assert told_size(Stribeck(), parameters, 2.5) is told

@@ -176,3 +176,12 @@ def test_the_rotor_that_a_result_rests_on_is_told_where_nobody_stated_it(result)
         "joint": "joint1", "armature": 4.1, "factor": 1.02, "unit": "kg m^2", "nominal": 2.4, "stated": False, "told": True,
     }  # fmt: skip
     assert diagnosis_dict(result)["rotors"] == []
+
+
+def test_an_effect_that_is_there_and_whose_size_is_not_told_says_so(result, content):
+    (effect,) = result.effects
+    assert content["effects"][0]["size_told"] is True
+    unsure = replace(result, effects=(replace(effect, size_told=False),))
+    assert "but not how large it is" in " ".join(sentences(unsure))
+    assert "but not how large it is" not in " ".join(sentences(result))
+    assert diagnosis_dict(unsure)["effects"][0]["size_told"] is False

@@ -169,6 +169,10 @@ def _effect_words(effect: FoundEffect, context: DiagnosisContext) -> list[Block]
         for label, parameter in effect.parameters.items()
     ]
     blocks: list[Block] = [Paragraph(words), Table(("parameter", "value", "std", "unit"), rows, (1, 2))]
+    if not effect.size_told:
+        blocks.append(
+            Paragraph("That it is there is told by what it removes; how large it is these recordings do not tell.")
+        )
     if len(found := intervals(effect, context.diagnosis)) > 1:
         blocks += [Paragraph("It acts in these intervals:"), _interval_table(found)]
     if effect.confounded_with:
