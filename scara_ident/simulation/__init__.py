@@ -14,7 +14,8 @@ from scara_ident.simulation.paths import PathError, circle, line
 from scara_ident.simulation.reconstructions import RECONSTRUCTIONS, reconstruction
 from scara_ident.simulation.reference import ReferenceMotion, read_trajectory, sampled
 from scara_ident.simulation.runs import RunState, TorqueNoise
-from scara_ident.simulation.simulate import SimulationResult, TrueMotion, free_motion, simulate
+from scara_ident.simulation.simulate import SimulationResult, free_motion, simulate
+from scara_ident.simulation.true_motion import TrueMotion
 from scara_ident.simulation.truth import truth, write_simulation
 
 __all__ = [

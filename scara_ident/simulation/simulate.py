@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.errors import LostArm, RecordingError, UsageError
+from scara_ident.errors import RecordingError, UsageError
 from scara_ident.manners import Reported
 from scara_ident.recording.recording import Recording
 from scara_ident.simulation.arm import VirtualArm
@@ -20,48 +20,12 @@ from scara_ident.simulation.plant import PlantDraft
 from scara_ident.simulation.reference import MOST_SAMPLES, ReferenceMotion
 from scara_ident.simulation.runs import RunState, TorqueNoise
 from scara_ident.simulation.torque_sensor import recorded_effort
+from scara_ident.simulation.true_motion import TrueMotion, needed_substeps, true_motion
 
 # Integration steps per controller period: on the SCARA03 the energy then drifts by 4e-15 in 10 s, and friction that
 # depends on speed, spring and ripple effects are resolved with a margin.
 SUBSTEPS = 4
-# Steps of this share of the fastest natural period's radian keep the Runge-Kutta step accurate and stable.
-STIFF_STEP = 0.4
-MOST_SUBSTEPS = 400
 WHITE = TorqueNoise()
-
-
-@dataclass(frozen=True, eq=False)
-class TrueMotion:
-    """What the arm really did, at the recording's times; every array of shape (n, N), the robot's order.
-
-    Attributes
-    ----------
-    position, velocity, acceleration : ndarray
-        Of the drives, seen through the gears; without elasticity also of the links.
-    link_position, link_velocity, link_acceleration : ndarray
-        Of the links.
-    effort : ndarray
-        Torque of the drive held from this sample to the controller's next, N m on the effort side. With the
-        acceleration at this sample it satisfies the equations of motion exactly.
-    load : ndarray
-        Torque through the gear, without the rotor's own inertia, at the joint.
-    direction : ndarray
-        What dry friction is multiplied with: sign of the velocity, 0 where the joint sticks, or the presliding state.
-    """
-
-    position: Array
-    velocity: Array
-    acceleration: Array
-    link_position: Array
-    link_velocity: Array
-    link_acceleration: Array
-    effort: Array
-    load: Array
-    direction: Array
-
-    def every(self, ticks: int) -> TrueMotion:
-        """Return each ``ticks``-th sample, from the first."""
-        return TrueMotion(*(np.ascontiguousarray(getattr(self, field.name)[:, ::ticks]) for field in fields(self)))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -197,8 +161,8 @@ def simulate(
     if added.shape != wanted.position.shape:
         raise UsageError(f"feed has shape {added.shape}; expected {wanted.position.shape}, a column per tick")
     position, velocity = reached.position[back], reached.velocity[back]
-    steps = max(least_substeps, _needed_substeps(moved, draft, control)) if substeps is None else substeps
-    measured, seen, true, stops = _run(
+    steps = max(least_substeps, needed_substeps(moved, draft, control)) if substeps is None else substeps
+    measured, seen, true, stops = true_motion(
         moved, draft, control, steps, np.stack([position.T, velocity.T]),
         (arm.scale[:, None] * added)[back].T, start[back],
         position[:, 0], velocity[:, 0], f"{motion.name} on {arm.robot.name}",
@@ -276,8 +240,8 @@ def free_motion(
     given = np.zeros((n, 1)) if torque is None else np.asarray(torque, dtype=float).reshape(n, -1)
     back = np.argsort(arm.robot.order)
     feed = np.broadcast_to(arm.scale[:, None] * given, (n, samples))[back].T
-    steps = max(SUBSTEPS, _needed_substeps(arm, draft, rate)) if substeps is None else substeps
-    _, _, true, _ = _run(
+    steps = max(SUBSTEPS, needed_substeps(arm, draft, rate)) if substeps is None else substeps
+    _, _, true, _ = true_motion(
         arm, draft, rate, steps, np.zeros((2, 1, n)), feed, np.zeros(n),
         np.asarray(position, dtype=float)[back], np.asarray(velocity, dtype=float)[back],
         f"{arm.robot.name} without a controller", controlled=False,
@@ -319,82 +283,3 @@ def _at_rate(arm: VirtualArm, motion: ReferenceMotion, rate: float) -> Reference
     return ReferenceMotion(
         motion.name, motion.joints, np.arange(samples) / rate, moved.position, moved.velocity, moved.acceleration
     )
-
-
-def _run(
-    arm: VirtualArm,
-    draft: PlantDraft,
-    rate: float,
-    substeps: int,
-    reference: Array,
-    feed: Array,
-    start: Array,
-    position: Array,
-    velocity: Array,
-    what: str,
-    controlled: bool = True,
-) -> tuple[Array, Array, TrueMotion, int]:
-    from scara_ident.simulation.loop import no_gains, track
-
-    plant = draft.plant()
-    # What no controller acts on has no filter either, which the rate could be too low for.
-    gains = arm.controller.gains(rate, arm.robot.order) if controlled else no_gains(arm.robot.n)
-    link = position - _stretch(draft, start)
-    trace, stops = track(
-        plant, draft.sensing(), gains, period=1.0 / rate, substeps=substeps, reference=reference, feed=feed, start=start,
-        initial=(link, velocity, position, velocity), controlled=controlled,
-    )  # fmt: skip
-    if stops < 0:
-        raise LostArm(
-            f"{what}: the arm got out of control at {(-1 - stops) / rate:.3f} s; in Python give it a slower controller, or substeps"
-        )
-    order = arm.robot.order
-
-    def rows(values: Array) -> Array:
-        return np.ascontiguousarray(values.T[order])
-
-    true = TrueMotion(
-        position=rows(trace.theta),
-        velocity=rows(trace.omega),
-        acceleration=rows(trace.alpha),
-        link_position=rows(trace.q),
-        link_velocity=rows(trace.v),
-        link_acceleration=rows(trace.a),
-        effort=rows(trace.drive) / arm.scale[:, None],
-        load=rows(trace.load),
-        direction=rows(trace.direction),
-    )
-    return rows(trace.measured), rows(trace.velocity), true, stops
-
-
-def _stretch(draft: PlantDraft, torque: Array) -> Array:
-    """Wind-up of elastic joints under the torque at the start, shape (n,)."""
-    elastic = draft.arrays["elastic"] > 0.0
-    wound = np.divide(torque, draft.arrays["stiffness"], out=np.zeros(draft.n), where=elastic)
-    return np.asarray(np.where(elastic, wound + 0.5 * draft.arrays["width"] * np.sign(torque), 0.0))
-
-
-def _needed_substeps(arm: VirtualArm, draft: PlantDraft, rate: float) -> int:
-    """Return how many steps per sample the stiffest elastic joint or presliding friction needs."""
-    from scara_ident.simulation.external import SHAFT_WAY
-
-    arrays = draft.arrays
-    link = arm.link_inertia()[np.argsort(arm.robot.order)]
-    rotor = arrays["armature"]
-    stiffness = np.where(arrays["elastic"] > 0.0, arrays["stiffness"], 0.0)
-    # Inertial coupling makes a link lighter than its diagonal entry; 4 covers the arms at hand.
-    square = np.divide(stiffness, rotor, out=np.zeros(draft.n), where=stiffness > 0.0) + 4.0 * stiffness / link
-    dry = arrays["friction"][:, 0] + arrays["stribeck_amplitude"]
-    sliding = arrays["presliding"]
-    square += np.divide(4.0 * dry, sliding * (link + rotor), out=np.zeros(draft.n), where=sliding > 0.0)
-    for i, j, coulomb in zip(*(arrays[f"shaft_{name}"] for name in ("joint", "other", "coulomb")), strict=True):
-        both = np.array([i, j], dtype=int)
-        square[both] += 4.0 * coulomb / (SHAFT_WAY * (link + rotor)[both])
-    needed = int(np.ceil(float(np.sqrt(square.max())) / (rate * STIFF_STEP)))
-    if needed > MOST_SUBSTEPS:
-        joint = arm.robot.joints[int(np.flatnonzero(arm.robot.order == int(np.argmax(square)))[0])]
-        raise UsageError(
-            f"{joint}: so stiff that {needed} steps per sample would be needed (at most {MOST_SUBSTEPS}); "
-            "lower its stiffness or raise its presliding distance"
-        )
-    return needed

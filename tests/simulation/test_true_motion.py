@@ -1,0 +1,59 @@
+"""What the arm really does: the equations of motion at every sample, and steps as fine as what is stiff needs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from scara_ident.errors import LostArm, UsageError
+from scara_ident.simulation import VirtualArm, parse_effect, simulate
+from scara_ident.simulation.plant import PlantDraft
+from scara_ident.simulation.true_motion import MOST_SUBSTEPS, needed_substeps
+from tests.simulation.made import bare, rigid, scara, swing
+
+
+def drafted(arm: VirtualArm, *effects: str) -> PlantDraft:
+    draft = arm.draft()
+    for words in effects:
+        parse_effect(words).resolve(arm).apply(arm, draft)
+    return draft
+
+
+def test_torque_and_acceleration_of_a_sample_meet_the_equations_of_motion() -> None:
+    arm = bare(scara())
+    true = simulate(arm, swing(arm.robot, 1.0)).true
+    expected = rigid(arm, true.position, true.velocity, true.acceleration)
+    np.testing.assert_allclose(true.effort, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
+
+
+def test_each_so_many_of_its_samples_are_the_same_of_every_signal() -> None:
+    true = simulate(scara(), swing(scara().robot, 0.2)).true
+    thin = true.every(7)
+    for name, signal in vars(thin).items():
+        np.testing.assert_array_equal(signal, getattr(true, name)[:, ::7])
+
+
+def test_a_stiffer_gear_takes_finer_steps_as_the_root_of_its_stiffness() -> None:
+    arm = scara()
+    few, many = (
+        needed_substeps(arm, drafted(arm, f"joint_elasticity:joint1:stiffness={k}"), 100.0) for k in (4e4, 16e4)
+    )
+    assert few > 4
+    assert many / few == pytest.approx(2.0, rel=0.1)
+    assert needed_substeps(arm, drafted(arm), 1000.0) == 0
+
+
+def test_what_would_take_for_ever_is_refused_with_the_joint_and_what_to_do() -> None:
+    arm = scara()
+    with pytest.raises(UsageError, match=f"^joint2: so stiff that .*at most {MOST_SUBSTEPS}.*; lower its stiffness"):
+        needed_substeps(arm, drafted(arm, "joint_elasticity:joint2:stiffness=1e12"), 1000.0)
+
+
+def test_an_arm_that_its_controller_loses_says_when() -> None:
+    arm = scara()
+    # Of the wrong sign it pushes the arm away.
+    wild = replace(arm, controller=replace(arm.controller, proportional=-100.0 * arm.controller.proportional))
+    with pytest.raises(LostArm, match=r"^swing on scara03: the arm got out of control at \d"):
+        simulate(wild, swing(arm.robot, 1.0))
