@@ -1,7 +1,8 @@
 """Effects that a rigid body with polynomial friction lacks, one file per physical family."""
 
 from scara_ident.effects.catalogue import CATALOGUE, EFFECTS, available_effects, effects_named
-from scara_ident.effects.effect import Effect, EffectTerm, SpectralLine
+from scara_ident.effects.effect import Effect, SpectralLine
+from scara_ident.effects.effect_term import EffectTerm
 from scara_ident.effects.parameters import Coefficient, Interval, Member, NonlinearParameter, Parameter, Tie, View
 from scara_ident.effects.signals import Scene, Signals
 

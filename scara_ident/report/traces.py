@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
-from scara_ident.effects.effect import EffectTerm
+from scara_ident.effects import EffectTerm
 from scara_ident.estimation.observations import Observations, Raw
 from scara_ident.model.model import TorqueModel
 from scara_ident.model.terms import Friction

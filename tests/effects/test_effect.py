@@ -103,18 +103,6 @@ def test_columns_that_do_not_fit_are_an_error(made, said):
         Torn().by_joint(Signals(scene, item), Member(0, (0.1,)))
 
 
-def test_columns_that_no_coefficient_names_are_an_error_in_a_model_too():
-    class Torn(Hook):
-        def signal_columns(self, signals, member):
-            return [signals.time, signals.time]
-
-    scene, item = scene_of(load_robot()), moving(load_robot(), 0.02)
-    with pytest.raises(ScaraIdentError, match="effect hook: 1 coefficients, but 2 columns"):
-        EffectTerm(Torn(), Member(0, (0.1,)), scene).fill(
-            item, [np.empty((1, item.samples)), np.empty((0, item.samples))]
-        )
-
-
 def test_effects_are_equal_by_class():
     assert Hook() == Hook()
     assert len({*CATALOGUE, *(type(effect)() for effect in CATALOGUE)}) == len(CATALOGUE)
