@@ -6,11 +6,13 @@ and motions contradict each other a note says so.
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.motion.motion import Stretch
@@ -106,9 +108,16 @@ def _groups(stretches: Sequence[Stretch]) -> list[list[int]]:
     coarse = [at_rate(stretch, COARSE_RATE) for stretch in stretches]
     fine: dict[int, Array] = {}
     group = list(range(len(stretches)))
+    # Those of one length are compared with a further one together.
+    places = {shape: [k for k, item in enumerate(coarse) if item.shape == shape] for shape in {c.shape for c in coarse}}
+    together = {shape: np.array([coarse[k] for k in own]) for shape, own in places.items()}
     for k in range(1, len(stretches)):
-        for i in range(k):
-            if group[i] == group[k] or not _alike(coarse[i], coarse[k]):
+        alike = list[int]()
+        for shape, own in places.items():
+            count = bisect_left(own, k)
+            alike += [i for i, same in zip(own, _alike(together[shape][:count], coarse[k]), strict=False) if same]
+        for i in sorted(alike):
+            if group[i] == group[k]:
                 continue
             for place in (i, k):
                 if place not in fine:
@@ -119,12 +128,13 @@ def _groups(stretches: Sequence[Stretch]) -> list[list[int]]:
     return [[k for k, own in enumerate(group) if own == head] for head in dict.fromkeys(group)]
 
 
-def _alike(one: Array, other: Array) -> bool:
-    """Tell whether positions at the coarse rate may be of one motion."""
-    if min(one.shape[1], other.shape[1]) < LEAST_LENGTH * max(one.shape[1], other.shape[1]):
-        return False
-    distance, _ = _distances(one, other, round(LARGEST_SHIFT * COARSE_RATE))
-    return len(distance) > 0 and bool(np.min(distance) < COARSELY_SAME**2)
+def _alike(some: Array, other: Array) -> NDArray[np.bool_]:
+    """Tell which positions at the coarse rate, shape (k, n, N), may be of the motion of others, shape (n, M)."""
+    lengths = some.shape[-1], other.shape[-1]
+    if not len(some) or min(lengths) < LEAST_LENGTH * max(lengths):
+        return np.zeros(len(some), dtype=bool)
+    distance, _ = _distances(some, other, round(LARGEST_SHIFT * COARSE_RATE))
+    return np.asarray(np.min(distance, axis=-1, initial=np.inf) < COARSELY_SAME**2)
 
 
 def alignment(reference: Array, other: Array, largest: int) -> int | None:
@@ -151,26 +161,35 @@ def alignment(reference: Array, other: Array, largest: int) -> int | None:
 
 
 def _distances(reference: Array, other: Array, largest: int) -> tuple[Array, int]:
-    """Return the mean squared distance in shares of the range for every shift, and the largest shift."""
+    """Return the mean squared distance in shares of the range for every shift, and the largest shift.
+
+    Parameters
+    ----------
+    reference : ndarray, shape (..., n, N)
+        Of one motion, or of several that are as long.
+    other : ndarray, shape (n, M)
+    """
     from scipy.fft import next_fast_len
 
-    length = min(reference.shape[1], other.shape[1])
+    length = min(reference.shape[-1], other.shape[-1])
     if length < 4:
-        return np.zeros(0), 0
+        return np.zeros((*reference.shape[:-2], 0)), 0
     largest = min(largest, length // 4)
-    spread = np.maximum(np.ptp(reference[:, :length], axis=1), np.ptp(other[:, :length], axis=1))
-    scale = np.maximum(spread, max(LEAST_RANGE * float(np.max(spread)), 1e-12))[:, None]
-    x = reference[:, largest : length - largest] / scale
+    spread = np.maximum(np.ptp(reference[..., :length], axis=-1), np.ptp(other[:, :length], axis=-1))
+    least = np.maximum(LEAST_RANGE * np.max(spread, axis=-1, keepdims=True), 1e-12)
+    scale = np.maximum(spread, least)[..., None]
+    x = reference[..., largest : length - largest] / scale
     y = other[:, :length] / scale
     # By FFT: |x|^2 + |y|^2 - 2 x.y. About a common centre, so that the difference keeps its digits.
-    centre = x.mean(axis=1, keepdims=True)
+    centre = x.mean(axis=-1, keepdims=True)
     x, y = x - centre, y - centre
-    size = x.shape[1]
+    size = x.shape[-1]
     starts = np.arange(2 * largest + 1)
     # No shift that is asked for reaches round the end.
     padded = next_fast_len(length, real=True)
-    spectrum = np.fft.rfft(y, padded, axis=1) * np.conj(np.fft.rfft(x, padded, axis=1))
-    product = np.fft.irfft(np.sum(spectrum, axis=0), padded)[starts]
-    square = np.concatenate([[0.0], np.cumsum(np.sum(y**2, axis=0))])
-    total = np.sum(x**2) + square[starts + size] - square[starts] - 2.0 * product
-    return np.maximum(total, 0.0) / x.size, largest
+    spectrum = np.fft.rfft(y, padded, axis=-1) * np.conj(np.fft.rfft(x, padded, axis=-1))
+    product = np.fft.irfft(np.sum(spectrum, axis=-2), padded)[..., starts]
+    square = np.cumsum(np.sum(y**2, axis=-2), axis=-1)
+    square = np.concatenate([np.zeros((*square.shape[:-1], 1)), square], axis=-1)
+    total = np.sum(x**2, axis=(-2, -1))[..., None] + square[..., starts + size] - square[..., starts] - 2.0 * product
+    return np.maximum(total, 0.0) / (x.shape[-2] * size), largest
