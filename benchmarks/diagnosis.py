@@ -56,19 +56,33 @@ def summary(runs: dict[str, list[Run]], target: float) -> dict[str, Any]:
     }
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+def asked(description: str | None, repeats: int) -> tuple[argparse.Namespace, dict[str, list[str]]]:
+    """Return what was given on the command line, and the commands that it chooses."""
+    parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("old", type=Path, help="checkout whose time is the reference")
     parser.add_argument("new", type=Path, help="checkout to compare")
     parser.add_argument("--shared", type=Path, default=Path("../shared"), help="folder with data and cases")
-    parser.add_argument("--repeats", type=int, default=5)
+    parser.add_argument("--repeats", type=int, default=repeats)
     parser.add_argument("--only", default="", help="regular expression that names of commands must hold")
     parser.add_argument("--output", type=Path, help="JSON of the figures")
     options = parser.parse_args()
-    sides = {"old": options.old, "new": options.new}
     chosen = {name: words for name, words in commands(options.shared).items() if re.search(options.only, name)}
     if not chosen:
         parser.error(f"no command holds {options.only!r}")
+    return options, chosen
+
+
+def write(output: Path | None, results: dict[str, Any], repeats: int) -> None:
+    """Write the figures of the commands as JSON, if asked for."""
+    if output is not None:
+        output.parent.mkdir(parents=True, exist_ok=True)
+        content = {"repeats": repeats, "cores": os.cpu_count(), "commands": results}
+        output.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+
+
+def main() -> None:
+    options, chosen = asked(__doc__, repeats=5)
+    sides = {"old": options.old, "new": options.new}
     shortest = next(iter(chosen.values()))
     for checkout in sides.values():
         timed(checkout, shortest)
@@ -91,10 +105,7 @@ def main() -> None:
             flush=True,
         )
     print(f"medians of {options.repeats} repeats in turn; with report; {os.cpu_count()} cores")
-    if options.output:
-        options.output.parent.mkdir(parents=True, exist_ok=True)
-        content = {"repeats": options.repeats, "cores": os.cpu_count(), "commands": results}
-        options.output.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+    write(options.output, results, options.repeats)
 
 
 if __name__ == "__main__":

@@ -18,11 +18,9 @@ longer; where the bound is below a target, that cannot be met by leaving out wor
 
 from __future__ import annotations
 
-import argparse
 import importlib
 import json
 import os
-import re
 import subprocess
 import sys
 import tempfile
@@ -32,7 +30,7 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-from diagnosis import CASES_TARGET, UR10E_TARGET, commands, timed
+from diagnosis import CASES_TARGET, UR10E_TARGET, asked, timed, write
 
 PARTS = ("start", "base", "columns", "look", "page")
 # Module, what holds the function, its name, and the part that its first call is.
@@ -100,17 +98,7 @@ def parts_of(checkout: Path, words: Sequence[str]) -> dict[str, float]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("old", type=Path, help="checkout whose time is the reference")
-    parser.add_argument("new", type=Path, help="checkout whose least time is looked for")
-    parser.add_argument("--shared", type=Path, default=Path("../shared"), help="folder with data and cases")
-    parser.add_argument("--repeats", type=int, default=3)
-    parser.add_argument("--only", default="", help="regular expression that names of commands must hold")
-    parser.add_argument("--output", type=Path, help="JSON of the figures")
-    options = parser.parse_args()
-    chosen = {name: words for name, words in commands(options.shared).items() if re.search(options.only, name)}
-    if not chosen:
-        parser.error(f"no command holds {options.only!r}")
+    options, chosen = asked(__doc__, repeats=3)
     for checkout in (options.old, options.new):
         timed(checkout, next(iter(chosen.values())))
     print(
@@ -140,10 +128,7 @@ def main() -> None:
             f"{name:24}{median(old):7.2f}{median(new):7.2f}{columns}{least:9.2f}{bound:9.2f}{target:9.0f}", flush=True
         )
     print(f"medians of {options.repeats} repeats in turn; at most: old over the sum; {os.cpu_count()} cores")
-    if options.output:
-        options.output.parent.mkdir(parents=True, exist_ok=True)
-        content = {"repeats": options.repeats, "cores": os.cpu_count(), "commands": results}
-        options.output.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+    write(options.output, results, options.repeats)
 
 
 if __name__ == "__main__":
