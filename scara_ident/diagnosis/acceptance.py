@@ -53,10 +53,12 @@ def decide(
     tried : int
         Candidates and scan points tried, for the correction of the p-value.
     """
-    unseen = _unseen(examination, criteria)
-    small = hopeless(candidate, examination, scene, criteria) or _small(candidate, examination, scene, gain, criteria)
+    unseen = _unseen(examination, criteria) or _faint(examination, gain, criteria)
+    impossible = _unseen(examination, criteria) or _inadmissible(candidate, examination, scene)
+    small = impossible or _small(candidate, examination, scene, gain, criteria)
+    seldom = _seldom(candidate, examination, gain, criteria)
     # The first reason that a person would give.
-    why = unseen or _insignificant(examination, tried, criteria) or small or _seldom(candidate, examination, criteria)
+    why = unseen or _insignificant(examination, tried, criteria) or small or seldom
     if _wrong_sign(candidate, examination):
         # The best that a real one can be is absent: nothing is removed, and nothing speaks for it.
         examination, gain = replace(examination, p_value=1.0), min(gain, 0.0)
@@ -76,18 +78,30 @@ def _wrong_sign(candidate: Candidate, examination: Examination) -> bool:
 def _unseen(examination: Examination, criteria: SelectionCriteria) -> str | None:
     if examination.outside < criteria.absorbed:
         return "the model absorbs it: these recordings cannot show it"
-    if examination.outside < criteria.least_outside:
-        return f"only {examination.outside:.1e} of it lies outside the model: these recordings cannot show it"
     return None
 
 
-def hopeless(candidate: Candidate, examination: Examination, scene: Scene, criteria: SelectionCriteria) -> str | None:
-    """Say why these recordings cannot show a candidate, or no arm can have it with the coefficients found; else None."""
+def _faint(examination: Examination, gain: float, criteria: SelectionCriteria) -> str | None:
+    """Say so where the model's own small errors may make it; they do not make most of what is left lie along one column."""
+    if examination.outside >= criteria.least_outside or gain >= criteria.dominant:
+        return None
+    return f"only {examination.outside:.1e} of it lies outside the model, whose own small errors may look like it"
+
+
+def _inadmissible(candidate: Candidate, examination: Examination, scene: Scene) -> str | None:
     std = np.sqrt(np.clip(np.diag(examination.covariance), 0.0, None))
     # Judged beside the parameters that the model has once the candidate is in it.
     after = replace(scene, value=examination.model_value[: len(scene.value)])
-    return _unseen(examination, criteria) or candidate.effect.inadmissible(
-        after, candidate.member, examination.value, std
+    return candidate.effect.inadmissible(after, candidate.member, examination.value, std)
+
+
+def hopeless(decision: Decision, scene: Scene, criteria: SelectionCriteria) -> str | None:
+    """Say why these recordings cannot show a candidate, or no arm can have it with the coefficients found; else None."""
+    found = decision.examination
+    return (
+        _unseen(found, criteria)
+        or _faint(found, decision.gain, criteria)
+        or _inadmissible(decision.candidate, found, scene)
     )
 
 
@@ -118,9 +132,12 @@ def _insignificant(examination: Examination, tried: int, criteria: SelectionCrit
     return f"not significant: p = {min(corrected, 1.0):.1e} over the {tried} candidates tried, {asked}"
 
 
-def _seldom(candidate: Candidate, examination: Examination, criteria: SelectionCriteria) -> str | None:
+def _seldom(candidate: Candidate, examination: Examination, gain: float, criteria: SelectionCriteria) -> str | None:
     helps, voting = examination.votes
     # What is taken out of the recordings is the mean of them, whatever they differ by: left in, others would stand for it.
-    if voting and not candidate.corrects_data and helps < criteria.least_votes * voting:
-        return f"helps in only {helps} of {voting} trajectories that it was not fitted to"
-    return None
+    if not voting or candidate.corrects_data or helps >= criteria.least_votes * voting:
+        return None
+    # Of few trajectories one may be where it hardly shows: all would be asked of three.
+    if gain >= criteria.dominant and voting - helps == 1 and helps > 1:
+        return None
+    return f"helps in only {helps} of {voting} trajectories that it was not fitted to"

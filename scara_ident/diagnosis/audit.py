@@ -114,7 +114,7 @@ def beaten_by_impossible(found: Search, weights: Array) -> list[Decision]:
         for item in best_of_each(found.decisions).values()
         if item.examination.p_value * found.tried <= criteria.family_error
         and item.gain >= criteria.least_gain
-        and hopeless(item.candidate, item.examination, found.scene, criteria) is not None
+        and hopeless(item, found.scene, criteria) is not None
     ]
     result = []
     for place, candidate in enumerate(step.chosen if rivals else ()):

@@ -32,7 +32,7 @@ class SelectionCriteria:
     least_outside: float = _criterion(
         5e-4,
         "share of its square",
-        "what the model nearly spans is known by its own small errors only",
+        "what the model nearly spans is known by its own small errors only, unless it removes most of what is left (`dominant`)",
         "docs/diagnosis.md",
     )
     abstains: float = _criterion(
@@ -89,7 +89,11 @@ class SelectionCriteria:
         6.0, "periods in a recording", "a slower line in time is not told from the motion's own harmonics"
     )
     # Searching.
-    most_effects: int = _criterion(6, "effects", "more at once are not believed")
+    most_effects: int = _criterion(
+        3,
+        "effects per joint, and of the whole arm",
+        "more at once are not believed, and what is left is then not called noise",
+    )
     near_best: float = _criterion(
         0.6, "of the best gain", "families worth refining before one is chosen: a grid point loses up to 40 %"
     )
@@ -97,7 +101,7 @@ class SelectionCriteria:
     dominant: float = _criterion(
         0.5,
         "share of squared residual",
-        "a family whose grid point removes as much is fitted, or another band tried for it, however few blocks show it",
+        "a family whose grid point removes as much is fitted, or another band tried for it, however few blocks show it; what does is no small error of the model",
     )
     most_fitted: int = _criterion(
         2,

@@ -76,7 +76,7 @@ def _promised_band(found: Search, criteria: SelectionCriteria) -> float:
         and more_than_chance(item, found.tried, criteria)
         # A grid point loses the rest.
         and item.gain >= criteria.near_best * criteria.least_gain
-        and hopeless(item.candidate, item.examination, found.scene, criteria) is None
+        and hopeless(item, found.scene, criteria) is None
     ]
     if not promising:
         return 0.0

@@ -19,7 +19,7 @@ from scara_ident.diagnosis.interval_fit import refined
 from scara_ident.diagnosis.lines import line_candidates
 from scara_ident.diagnosis.nonlinear_fit import tune
 from scara_ident.diagnosis.search_state import SearchState, Step
-from scara_ident.diagnosis.selection_step import SelectionStep, model_with
+from scara_ident.diagnosis.selection_step import SelectionStep, best_of_each, model_with
 from scara_ident.diagnosis.work import after_rounds
 from scara_ident.effects import Effect, Scene
 from scara_ident.effects.catalogue import available_effects
@@ -210,6 +210,7 @@ def _searched(
 ) -> Search:
     """Let in one effect after another until none is left that helps."""
     criteria, near = task.criteria, None if known is None else known.step
+    most = criteria.most_effects * (base.first.robot.n + 1)
     # The fit that a step keeps goes with it: who asked for the search holds another.
     state = replace(state, step=replace(state.step))
     while True:
@@ -223,7 +224,7 @@ def _searched(
         taken = {*without, *state.labels}
         decisions += step.judge([item for item in seeds if item.label(scene) not in taken])
         winner, refused = None, dict[str, Decision]()
-        if len(state.steps) < criteria.most_effects:
+        if len(state.steps) < most:
             winner, refused, scene = choose(step, decisions, near)
             if winner is None and chosen != state.asked:
                 # What came in may have hidden when something acts.
@@ -233,6 +234,10 @@ def _searched(
                 found = step.judge(more)
                 winner, unsound, scene = choose(step, found, near)
                 decisions, refused = decisions + found, refused | unsound
+        else:
+            # What would come in next is not believed, and not forgotten.
+            full = f"its tests let it in, but {most} effects are in the model and no more are believed at once"
+            refused = {label: item.refused(full) for label, item in best_of_each(decisions).items() if item.accepted}
         decisions = [item for item in decisions if item.label not in refused] + list(refused.values())
         gone = None
         if winner is None:

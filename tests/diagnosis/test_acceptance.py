@@ -151,3 +151,30 @@ def test_what_fits_with_an_impossible_sign_only_has_no_gain_and_no_significance(
     assert decision.why == "no elastic gear: the link would run ahead of its motor"
     # Two coefficients, of which one has an impossible sign, say more than that.
     assert decided(SPRING, replace(GOOD, value=np.array([-0.05, 0.0])), 100).gain == 0.4
+
+
+def test_what_removes_most_of_what_is_left_is_no_small_error_of_the_model():
+    """A spring on a joint that carries its weight lay 2e-4 outside the model and removed 68 % with p = 1e-42: it was not named."""
+    faint = replace(GOOD, outside=2e-4)
+    assert decided(SPRING, faint, 100, gain=CRITERIA.dominant).accepted
+    below = decided(SPRING, faint, 100, gain=0.9 * CRITERIA.dominant)
+    assert not below.accepted and below.tentative and "small errors" in below.why
+    # Where only rounding is left of it, nothing that it removes says anything.
+    assert not decided(SPRING, replace(GOOD, outside=1e-9), 100, gain=0.9).accepted
+    # Nor what no arm has.
+    assert not decided(SPRING, replace(faint, value=np.array([-0.05, 0.0])), 100, gain=0.9).tentative
+
+
+@pytest.mark.parametrize(
+    ("fold_gains", "gain", "accepted"),
+    [
+        ((0.5, -0.1, 0.2, None), 0.6, True),
+        ((0.5, -0.1, 0.2, None), 0.4, False),
+        ((0.5, -0.1, None, None), 0.6, False),
+        ((0.5, -0.1, -0.2, 0.9), 0.6, False),
+    ],
+)
+def test_one_of_few_trajectories_does_not_outvote_what_removes_most(
+    fold_gains: tuple[float | None, ...], gain: float, accepted: bool
+):
+    assert decided(SPRING, replace(GOOD, fold_gains=fold_gains), 100, gain=gain).accepted is accepted

@@ -240,7 +240,7 @@ def test_the_diagnosis_page_lists_every_alias_and_the_limits_of_the_program() ->
         f"explain by over {100 * CRITERIA.remainder_of_runs:g} % of the squared residual (else {100 * CRITERIA.remainder:g} %)",
         f"removes as much as is asked with p at most {100 * CRITERIA.significant:g} % over all tried",
         f"stands out by at least {100 * CRITERIA.colour_of_remainder:g} %",
-        f"At most {CRITERIA.most_effects} effects",
+        f"At most {CRITERIA.most_effects} effects per joint, and as many of the whole arm",
         f"at least {100 * CRITERIA.least_share:g} % of what it removes",
     ):
         assert said in " ".join(page.split()), said
