@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from itertools import combinations, product
+from itertools import chain, combinations, product
+from math import comb
 
 import numpy as np
 
@@ -11,8 +12,9 @@ from scara_ident.identification.channel_comparison import mean
 from scara_ident.identification.channel_reading import QUARTERS, JointReading, Reading, as_mapped, with_joint
 from scara_ident.identification.few_rows import FewRows
 
-# Joints whose zeros are tried together, whatever each leaves alone; more only where the first of them leave less.
-TOGETHER = 3
+# Joints whose zeros are tried together, whatever each leaves alone; more only where the first of them leave less. Of arms with
+# many joints fewer, so that there are not more readings than this; nor all signs of their efforts.
+TOGETHER, MOST = 3, 1000
 # What may be of opposite sign on a joint.
 SIGNS = (JointReading(-1, 1), JointReading(1, -1), JointReading(-1, -1))
 # Readings that the search goes on from.
@@ -61,8 +63,8 @@ def searched(rows: FewRows) -> dict[Reading, float]:
 
 def _signs(start: Reading) -> Iterator[Reading]:
     """Give all signs of efforts, which share their columns, and other signs of two joints."""
-    for effort in product((1, -1), repeat=len(start)):
-        yield tuple(JointReading(sign) for sign in effort)
+    for effort in product((1, -1), repeat=len(start) if 2 ** len(start) <= MOST else 0):
+        yield tuple(JointReading(sign) for sign in effort) or start
     for pair in combinations(range(len(start)), 2):
         for one, other in product(SIGNS, repeat=2):
             yield with_joint(with_joint(start, pair[0], one), pair[1], other)
@@ -71,13 +73,13 @@ def _signs(start: Reading) -> Iterator[Reading]:
 def _zeros(start: Reading, changes: Sequence[Sequence[JointReading]]) -> Iterator[Reading]:
     """Give the zeros of a few joints together."""
     every = [(j, own) for j, some in enumerate(changes) for own in some if own.signal is None]
-    for count in range(1, TOGETHER + 1):
-        for some in combinations(every, count):
-            if len({j for j, _ in some}) == count:
-                reading = start
-                for j, own in some:
-                    reading = with_joint(reading, j, own)
-                yield reading
+    together = [count for count in range(1, TOGETHER + 1) if comb(len(every), count) <= MOST]
+    for some in chain.from_iterable(combinations(every, count) for count in together):
+        if len({j for j, _ in some}) == len(some):
+            reading = start
+            for j, own in some:
+                reading = with_joint(reading, j, own)
+            yield reading
 
 
 def _telling(rows: FewRows, tried: dict[Reading, float]) -> list[list[JointReading]]:
