@@ -124,11 +124,12 @@ def gravity_sentence(gravity: UrdfGravity | None) -> str | None:
             "springs bear it; log the whole effort, or state gravity: [0, 0, 0] in robot.yaml."
         )
     if gravity.elsewhere:
-        along = _near_axis(gravity.found / np.linalg.norm(gravity.found))
+        along = near_axis(gravity.found / np.linalg.norm(gravity.found))
         stated = float(np.linalg.norm(gravity.stated)) * along
         return (
             f"Gravity seems to point along {_listed(along)} of the base, {angle(along, gravity.stated):.0f} degrees from what "
-            f"the description says: if the arm is mounted so, state gravity: {_listed(stated)} in robot.yaml."
+            f"the description says: if the arm is mounted so, state gravity: {_listed(stated)} in robot.yaml; else a joint's "
+            "position may count from another zero than the URDF, as by half a turn of the shoulder (recording, position: offset)."
         )
     return None
 
@@ -139,7 +140,7 @@ def angle(one: Array, other: Array) -> float:
     return float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
 
 
-def _near_axis(along: Array) -> Array:
+def near_axis(along: Array) -> Array:
     """Return the axis of the base that a direction of length 1 is close to, or the direction itself."""
     place = int(np.argmax(np.abs(along)))
     axis = np.sign(along[place]) * np.eye(3)[place]

@@ -1,9 +1,7 @@
-"""Are the channels what the mapping says? Opposite signs and exchanged joints imitate every effect, so they come first."""
+"""Are the channels what the mapping says? Opposite signs, other zeros and exchanged joints imitate every effect, so they come first."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -15,44 +13,44 @@ from scara_ident.estimation.least_squares import weighted_value, wls
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.estimation.urdf_gravity import urdf_gravity
 from scara_ident.estimation.urdf_scale import urdf_scale
-from scara_ident.identification.channel_fault import MENDED, ChannelFault, Signal, merged
+from scara_ident.identification.channel_comparison import (
+    ALIKE,
+    POOR,
+    ROUNDING,
+    far_less,
+    few,
+    friction_pushes,
+    held_out,
+    mean,
+    relative,
+)
+from scara_ident.identification.channel_fault import MENDED, ChannelFault, merged
+from scara_ident.identification.channel_reading import Signal, as_mapped, observed_as, observed_exchanged, turned
+from scara_ident.identification.few_rows import FewRows
 from scara_ident.identification.magnitude_check import signed_fits
-from scara_ident.model.terms.friction import Friction
+from scara_ident.identification.zero_check import wrong_zeros
 from scara_ident.model.urdf_values import urdf_values
-from scara_ident.motion.prepared import PreparedData, PreparedStretch
+from scara_ident.motion.prepared import PreparedData
 
-# A better reading is better block by block at this level of significance.
-LEVEL = 0.001
-# Rows per parameter of each joint below which a fit comes near interpolation, whatever the channels are.
-ENOUGH_ROWS = 3.0
 # Share of the torque that another reading may leave at most in a band that was widened for rows: where noise has narrowed
 # the chosen one, the rows of the wider are many and say as little.
 EXPLAINED = 0.2
-# Of readings that count the simpler is taken where the other leaves more than this share of what it leaves.
-ALIKE = 0.8
-# Pieces of each recording, one of which is held out in turns.
-PIECES = 4
-# Joints whose error is above this share of their torque may be exchanged with another.
-POOR = 0.05
 # A sign turned round leaves more than this of some joint's torque.
 TURNED = 0.08
 # A joint that is left more than this is looked at in a wider band too: what is read wrongly is explained in none.
 NARROWED = 0.15
 # Exchanging one signal alone makes nonsense of both joints; of the one whose torque is large beside the other's, at least.
 BAD = 0.3
-# Friction that feeds in this share of a joint's power, and this many standard deviations, points to a sign.
-PUSHING = 0.02
-PUSHING_STD = 4.0
-# Residual that counts as none, as a share of the torque.
-ROUNDING = 1e-12
 # Hz up to which an arm that moves at all is moved.
 MOVED = 5.0
+# A signal, its joints, and whether they are exchanged or turned round.
+Suspect = tuple[Signal, tuple[int, ...], bool]
 
 
 def channel_faults(observations: Observations) -> tuple[ChannelFault, ...]:
-    """Find efforts and positions of opposite sign, those of two joints that are exchanged, and efforts without a sign.
+    """Find efforts and positions of opposite sign or of two joints exchanged, other zeros, and efforts without a sign.
 
-    A sign is suspected where friction would feed energy in or a joint is explained badly, an exchange where two joints are
+    A sign, or a zero by quarter turns (see `wrong_zeros`), is suspected where friction would feed energy in or a joint is explained badly, an exchange where two joints are
     hardly explained; only then are other readings tried, in a band that no wrong reading has narrowed. One counts if it
     leaves at most half of the error, on blocks of time that it was not fitted to and significantly more often than not,
     and the friction brakes. Where rows are not several times as many as parameters none is tried: an interpolating fit is
@@ -73,8 +71,8 @@ def channel_faults(observations: Observations) -> tuple[ChannelFault, ...]:
     model = observations.model
     joints = model.robot.joints
     bands = _wide(held)
-    errors = _relative(weighted_value(held.by_joint), held)
-    narrow = _few(held)
+    errors = relative(weighted_value(held.by_joint), held)
+    narrow = few(held)
     if narrow or any(errors[j] > NARROWED and bands[j] != held.data.bands[j] for j in range(len(joints))):
         # What is read wrongly is explained by no motion, so that its own band is left too narrow to tell.
         held = observe(model, held.data.at(bands))
@@ -82,22 +80,22 @@ def channel_faults(observations: Observations) -> tuple[ChannelFault, ...]:
     if unsigned is not None:
         # What else is read into magnitudes is of no channel.
         return (unsigned,)
-    few, most = _few(held), EXPLAINED if narrow else np.inf
+    too_few, most = few(held), EXPLAINED if narrow else np.inf
     faults: list[ChannelFault] = []
     for _ in range(2 * len(joints)):
         fitted = weighted_value(held.by_joint)
-        pushing = _pushing(fitted, held)
-        found = None if few else _best_reading(held, _relative(fitted, held), pushing, most)
+        pushing = friction_pushes(fitted, held)
+        found = None if too_few else _best_reading(held, relative(fitted, held), pushing, most)
         if found is not None:
-            faults.append(found[0])
+            faults += found[0]
             held = found[1]
             continue
         if np.any(pushing) and _all_turned(fitted, held, pushing):
-            _, left = _held_out(held)
-            faults.append(ChannelFault("effort", tuple(joints), False, _mean(left), _mean(left)))
+            _, left = held_out(held)
+            faults.append(ChannelFault("effort", tuple(joints), False, mean(left), mean(left)))
         elif _bodies_turned(fitted, held, pushing):
-            _, left = _held_out(held)
-            faults.append(ChannelFault("effort", tuple(joints), False, _mean(left), _mean(left), by_bodies=True))
+            _, left = held_out(held)
+            faults.append(ChannelFault("effort", tuple(joints), False, mean(left), mean(left), by_bodies=True))
         break
     return merged(faults, joints)
 
@@ -112,42 +110,52 @@ def _wide(observations: Observations) -> tuple[float | None, ...]:
 
 def _best_reading(
     held: Observations, errors: Array, pushing: NDArray[np.bool_], most: float
-) -> tuple[ChannelFault, Observations] | None:
+) -> tuple[list[ChannelFault], Observations] | None:
     """Return the reading of the channels that leaves least, if one counts and leaves at most a share, and what is observed with it."""
     suspects = _suspects(errors, pushing)
     if not suspects:
         return None
     joints = held.model.robot.joints
-    blocks, left = _held_out(held)
-    best: tuple[ChannelFault, Observations] | None = None
+    before = held_out(held)
+    best: tuple[list[ChannelFault], Observations] | None = None
     least = np.inf
+    zeros = wrong_zeros(held, before, pushing, most) if np.any(errors > TURNED) else None
+    if zeros is not None:
+        best, least = (zeros.faults(joints), zeros.observations), zeros.left
+        suspects = [one for one in suspects if _few_left(zeros.rows, one) < zeros.few_left]
     for signal, chosen, exchanged in suspects:
-        read = _read_as(held.data, signal, chosen, exchanged)
-        other = held.with_torque(read) if signal == "effort" else observe(held.model, read)
-        then, mended = _held_out(other)
-        said = np.ones(len(left), dtype=bool)
-        if signal == "effort" and not exchanged:
-            # All other joints may be explained for all that; those that are well explained either way say nothing.
-            said = np.maximum(left, mended) > POOR
-        before, after = _mean(left[said]), _mean(mended[said])
-        if after >= min(MENDED * before, most) or _mean(mended) >= ALIKE * least or not _better(blocks, then):
+        if exchanged:
+            other = observed_exchanged(held, signal, (chosen[0], chosen[1]))
+        else:
+            other = observed_as(held, turned(len(joints), signal, chosen[0]))
+        then = held_out(other)
+        if mean(then[1]) >= ALIKE * least:
+            continue
+        # All other joints may be explained for all that.
+        said = far_less(before, then, most, poor=signal == "effort" and not exchanged)
+        if said is None:
             continue
         # A turned sign must take the push away, and add none; signs that an exchange brings to light are the next round's.
         allowed = np.count_nonzero(pushing) - (signal != "effort and position" and bool(pushing[chosen[0]]))
-        if not exchanged and np.count_nonzero(_pushing(weighted_value(other.by_joint), other)) > allowed:
+        if not exchanged and np.count_nonzero(friction_pushes(weighted_value(other.by_joint), other)) > allowed:
             continue
         names = tuple(joints[j] for j in chosen)
-        best, least = (ChannelFault(signal, names, exchanged, before, after), other), _mean(mended)
+        best, least = ([ChannelFault(signal, names, exchanged, *said)], other), mean(then[1])
     return best
 
 
-def _few(observations: Observations) -> bool:
-    return any(0 < rows.table.shape[1] < ENOUGH_ROWS * len(rows.columns) for rows in observations.joints)
+def _few_left(rows: FewRows, suspect: Suspect) -> float:
+    """Return what a reading leaves of few rows."""
+    signal, joints, exchanged = suspect
+    as_they_are = as_mapped(len(rows.q))
+    if exchanged:
+        return mean(rows.exchanged(signal, (joints[0], joints[1])).left(as_they_are))
+    return mean(rows.left(turned(len(as_they_are), signal, joints[0])))
 
 
 def _unsigned(observations: Observations) -> ChannelFault | None:
     """Return the joints whose effort is explained far better as the magnitude of a torque of both signs."""
-    if _few(observations):
+    if few(observations):
         return None
     fits = {j: fit for j, fit in signed_fits(observations).items() if fit[1] < MENDED * fit[0]}
     if not fits:
@@ -157,12 +165,12 @@ def _unsigned(observations: Observations) -> ChannelFault | None:
     return ChannelFault("effort", names, False, error, mended, unsigned=True)
 
 
-def _suspects(errors: Array, pushing: NDArray[np.bool_]) -> list[tuple[Signal, tuple[int, ...], bool]]:
+def _suspects(errors: Array, pushing: NDArray[np.bool_]) -> list[Suspect]:
     """Return readings worth trying: the signal, its joints, and whether they are exchanged or turned round."""
     one: tuple[Signal, ...] = ("effort", "position")
     both: Signal = "effort and position"
     poor = [int(j) for j in np.flatnonzero(errors > POOR)]
-    found: list[tuple[Signal, tuple[int, ...], bool]] = []
+    found: list[Suspect] = []
     # An effort turned round may be taken up by parameters of its own joint, and show on those that carry it.
     found += [("effort", (int(j),), False) for j in np.flatnonzero(pushing | np.any(errors > TURNED))]
     found += [("position", (int(j),), False) for j in np.flatnonzero(pushing | (errors > TURNED))]
@@ -175,32 +183,6 @@ def _suspects(errors: Array, pushing: NDArray[np.bool_]) -> list[tuple[Signal, t
     return found
 
 
-def _read_as(data: PreparedData, signal: Signal, joints: Sequence[int], exchanged: bool) -> PreparedData:
-    """Return the recordings with a signal of one joint negated, or of two exchanged."""
-    n = len(data.bands)
-    order = list(range(n))
-    sign = np.ones((n, 1))
-    if exchanged:
-        order[joints[0]], order[joints[1]] = joints[1], joints[0]
-    else:
-        sign[joints[0]] = -1.0
-
-    def turned(rows: Array, wanted: bool) -> Array:
-        return sign * rows[order] if wanted else rows
-
-    def read(part: PreparedStretch) -> PreparedStretch:
-        position = turned(part.stretch.position, "position" in signal)
-        torque = turned(part.torque, "effort" in signal)
-        if "position" not in signal:
-            return part.with_torque_of(replace(part.stretch, torque=torque, _thinned={}))
-        return PreparedStretch(
-            replace(part.stretch, position=position, torque=torque, _filtered={}, _thinned={}), part.bands
-        )
-
-    recordings = [replace(item, stretches=tuple(map(read, item.stretches))) for item in data.recordings]
-    return replace(data, recordings=tuple(recordings))
-
-
 def _all_turned(value: Array, observations: Observations, pushing: NDArray[np.bool_]) -> bool:
     """Tell whether every effort has the opposite sign, which leaves as much as the right one and so is told by no residual.
 
@@ -209,7 +191,7 @@ def _all_turned(value: Array, observations: Observations, pushing: NDArray[np.bo
     """
     if np.all(pushing) and _net_power(observations.data) < 0.0:
         return True
-    if np.any(_pushing(-value, observations)):
+    if np.any(friction_pushes(-value, observations)):
         return False
     scales = urdf_scale(wls(observations), observations).values()
     return bool(scales) and max(scales) < 0.0
@@ -232,93 +214,9 @@ def _bodies_turned(value: Array, observations: Observations, pushing: NDArray[np
     gravity = urdf_gravity(observations)
     if gravity is None or not gravity.turned:
         return False
-    return bool(np.count_nonzero(_pushing(-value, observations)) <= np.count_nonzero(pushing))
+    return bool(np.count_nonzero(friction_pushes(-value, observations)) <= np.count_nonzero(pushing))
 
 
 def _net_power(data: PreparedData) -> float:
     """Return the energy that the efforts feed into the arm over recordings, up to the reductions' scale."""
     return float(sum(np.sum(part.torque[:, 1:] * np.diff(part.stretch.position)) for part in data.stretches))
-
-
-def _relative(value: Array, observations: Observations) -> Array:
-    tiny = np.finfo(float).tiny
-    return np.array([part.rms(value) / max(part.torque_rms, tiny) for part in observations.by_joint])
-
-
-def _held_out(observations: Observations) -> tuple[Array, Array]:
-    """Predict each piece of the recordings from the others.
-
-    Returns
-    -------
-    left : ndarray, shape (blocks, n)
-        Rms residual of each block as a share of the joint's torque; NaN where a joint has no rows.
-    all_left : ndarray, shape (n,)
-        The same over all blocks.
-    """
-    owner = observations.owner
-    place = np.arange(len(owner)) - np.searchsorted(owner, owner)
-    piece = place * PIECES // np.bincount(owner)[owner]
-    squares = np.zeros((len(owner), len(observations.joints)))
-    for which in range(PIECES):
-        fitted = np.flatnonzero(piece != which)
-        parts = tuple(rows.part(fitted) for rows in observations.joints)
-        value = weighted_value(replace(observations, joints=parts, owner=owner[fitted]).by_joint)
-        for j, rows in enumerate(observations.joints):
-            residual = rows.left(value)
-            total = np.concatenate([[0.0], np.cumsum(residual**2)])
-            squares[piece == which, j] = np.diff(total[rows.starts])[piece == which]
-    counts = np.array([rows.counts for rows in observations.joints]).T
-    torque = np.array([max(part.torque_rms, np.finfo(float).tiny) for part in observations.by_joint])
-    with np.errstate(invalid="ignore", divide="ignore"):
-        left = np.sqrt(np.maximum(squares, 0.0) / counts) / torque
-        relative = np.sqrt(np.sum(squares, axis=0) / np.sum(counts, axis=0)) / torque
-    return left, relative
-
-
-def _mean(left: Array) -> float:
-    """Return the geometric mean over the joints that have rows."""
-    known = left[np.isfinite(left)]
-    return float(np.exp(np.mean(np.log(np.maximum(known, ROUNDING))))) if len(known) else 1.0
-
-
-def _better(left: Array, other: Array) -> bool:
-    """Whether other residuals are smaller block by block, by a t test of the logarithms of their ratios."""
-    from scipy.special import stdtrit
-
-    both = np.isfinite(left) & np.isfinite(other)
-    ratios = np.where(both, np.log(np.maximum(other, ROUNDING)) - np.log(np.maximum(left, ROUNDING)), 0.0)
-    shared = np.sum(both, axis=1)
-    mean = np.sum(ratios, axis=1)[shared > 0] / shared[shared > 0]
-    if len(mean) < 2:
-        return False
-    spread = float(np.std(mean, ddof=1)) / np.sqrt(len(mean))
-    return bool(np.mean(mean) + float(stdtrit(len(mean) - 1, 1.0 - LEVEL)) * spread < 0.0)
-
-
-def _pushing(value: Array, observations: Observations) -> NDArray[np.bool_]:
-    """Return the joints whose estimated friction feeds energy in over the recorded motion, beyond its uncertainty."""
-    robot = observations.model.robot
-    friction = np.zeros(observations.parameters, dtype=bool)
-    for term in observations.model.terms:
-        if isinstance(term, Friction):
-            friction[observations.model.place(term)] = True
-    powers = np.zeros((robot.n, observations.parameters))
-    for j, rows in enumerate(observations.joints):
-        own = np.flatnonzero(friction[rows.columns])
-        passed = 0.0
-        for item, raws in zip(observations.data.recordings, observations.raw, strict=True):
-            part, raw = max(zip(item.stretches, raws, strict=True), key=lambda pair: pair[0].samples)
-            drive = robot.drive_sign[j] * part.motion.v[j]
-            powers[j, rows.columns[own]] += raw[j][own] @ drive
-            passed += float(np.sum(np.abs(part.torque[j] * drive)))
-        if powers[j] @ value >= -PUSHING * passed:
-            powers[j] = 0.0
-    if not np.any(powers):
-        return np.zeros(robot.n, dtype=bool)
-    # How sure the power is takes more time than the power, and mostly no joint is suspected.
-    covariance = wls(observations).covariance
-    known = np.isfinite(np.diag(covariance))
-    spread = np.where(known[:, None] & known, covariance, 0.0)
-    std = np.sqrt(np.einsum("jp,pq,jq->j", powers, spread, powers))
-    std[np.any(powers[:, ~known], axis=1)] = np.inf
-    return np.asarray((powers @ value < -PUSHING_STD * std) & np.any(powers, axis=1))

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 from scara_ident.errors import RecordingError
-
-Signal = Literal["effort", "position", "effort and position"]
+from scara_ident.identification.channel_reading import JointReading, Reading, Signal
 
 # Another mapping must leave at most this share of the error on blocks that it was not fitted to, geometric mean over joints.
 MENDED = 0.5
+SIGNALS: tuple[Signal, ...] = ("effort", "position", "effort and position")
 
 
 @dataclass(frozen=True)
@@ -22,10 +22,14 @@ class ChannelFault:
     ----------
     signal : {"effort", "position", "effort and position"}
     joints : tuple of str
-        Those whose sign is opposite, or the two that are exchanged.
+        Those whose sign is opposite, or whose position counts from elsewhere, or the two that are exchanged.
     error, mended : float
         Rms of what is left as a share of the torque, geometric mean over the joints (of an effort turned round those that
         either reading explains badly), on blocks of time that the parameters were not fitted to, as mapped and as it should be.
+    zeros : tuple of JointReading
+        Of each joint, where its position counts from elsewhere by quarter turns, how it is to be read; else empty.
+    rivals : tuple of str
+        In words, what leaves as much as these zeros, so that it may be that instead.
     unsigned : bool
         Whether the effort is a magnitude; its errors are those of the fit, of these joints alone.
     by_bodies : bool
@@ -37,18 +41,31 @@ class ChannelFault:
     exchanged: bool
     error: float
     mended: float
+    zeros: tuple[JointReading, ...] = ()
+    rivals: tuple[str, ...] = ()
     unsigned: bool = False
     by_bodies: bool = False
 
+    @property
+    def readings(self) -> Mapping[str, JointReading]:
+        """How each joint is to be read, but for exchanges and magnitudes."""
+        if self.zeros:
+            return dict(zip(self.joints, self.zeros, strict=True))
+        sign = JointReading(-1 if "effort" in self.signal else 1, -1 if "position" in self.signal else 1)
+        return dict.fromkeys(self.joints, sign)
+
     def __str__(self) -> str:
         """Say what, and what to do."""
-        gain = f"what is left of the torque falls from {100 * self.error:.2g} to {100 * self.mended:.2g} %"
+        before = f"{100 * self.error:.2g}" if self.error < 0.99 else f"{100 * self.error:.0f}"
+        gain = f"what is left of the torque falls from {before} to {100 * self.mended:.2g} %"
         names = (" and " if self.exchanged else ", ").join(self.joints)
         if self.unsigned:
             return (
                 f"effort of {names} seems to be logged without its sign: it never changes it, and with the signs that the "
                 f"motion asks for {gain}; log the effort with its sign"
             )
+        if self.zeros:
+            return self._elsewhere(gain)
         if self.exchanged:
             return (
                 f"{self.signal} of {names} look exchanged: the other way round {gain}; exchange their columns under "
@@ -72,28 +89,74 @@ class ChannelFault:
         verb = "look" if self.signal == "effort and position" else "looks"
         return f"{self.signal} of {names} {verb} like the opposite sign: turned round {gain}; {turn}"
 
+    def _elsewhere(self, gain: str) -> str:
+        """Say which zeros are elsewhere, and which lines mend it."""
+        each = self.readings
+        verb = "counts" if len(each) == 1 else "count"
+        turns = " and ".join(f"{_added(own)} on {joint}" for joint, own in each.items())
+        lines = ", ".join(f"{joint}: {0.5 * math.pi * own.quarters:.5f}" for joint, own in each.items())
+        said = f"position of {', '.join(each)} {verb} from another zero than the URDF: with {turns} {gain}"
+        if self.rivals:
+            said += f" (as it does with {', or with '.join(self.rivals)})"
+        mend = ""
+        for word, signal in (("position scale and offset", "position"), ("effort_gain", "effort")):
+            own = [joint for joint, read in each.items() if signal in (read.signal or "")]
+            if own:
+                mend += f"negate {word} of {', '.join(own)} in robot.yaml, "
+        return (
+            f"{said}; {mend}{'then ' if mend else ''}add in robot.yaml under recording, position: offset: {{{lines}}} in rad, or as "
+            "much in the unit there"
+        )
+
+
+def faults_of(
+    reading: Reading,
+    joints: Sequence[str],
+    error: float,
+    mended: float,
+    rivals: tuple[str, ...] = (),
+) -> list[ChannelFault]:
+    """Return the faults of a mapping that another reading mends."""
+    wrong = {joint: own for joint, own in zip(joints, reading, strict=True) if own.quarters}
+    found = []
+    if wrong:
+        found.append(ChannelFault("position", tuple(wrong), False, error, mended, tuple(wrong.values()), rivals))
+    for signal in SIGNALS:
+        own = tuple(
+            joint for joint, read in zip(joints, reading, strict=True) if not read.quarters and read.signal == signal
+        )
+        if own:
+            found.append(ChannelFault(signal, own, False, error, mended))
+    return found
+
 
 def merged(faults: Sequence[ChannelFault], joints: Sequence[str]) -> tuple[ChannelFault, ...]:
     """Return faults with those of one joint in one: what is turned twice is right."""
     each = [joint for fault in faults for joint in fault.joints]
     if len(set(each)) == len(each) or any(fault.exchanged for fault in faults):
         return tuple(faults)
-    kinds: dict[frozenset[str], Signal] = {
-        frozenset({"effort"}): "effort",
-        frozenset({"position"}): "position",
-        frozenset({"effort", "position"}): "effort and position",
-    }
-    turned: dict[str, frozenset[str]] = {joint: frozenset() for joint in joints}
+    read = dict.fromkeys(joints, JointReading())
     for fault in faults:
-        for joint in fault.joints:
-            turned[joint] ^= frozenset(fault.signal.split(" and "))
+        for joint, own in fault.readings.items():
+            read[joint] = read[joint].then(own)
     error, mended = max(fault.error for fault in faults), min(fault.mended for fault in faults)
-    found = []
-    for signals, signal in kinds.items():
-        own = tuple(joint for joint in joints if turned[joint] == signals)
-        if own:
-            found.append(ChannelFault(signal, own, False, error, mended))
-    return tuple(found)
+    return tuple(faults_of(tuple(read.values()), joints, error, mended))
+
+
+def in_words(reading: Reading, joints: Sequence[str]) -> str:
+    """Say in short what a reading has otherwise than the mapping."""
+    said = []
+    for joint, own in zip(joints, reading, strict=True):
+        if own.quarters:
+            said.append(f"{_added(own)} on {joint}")
+        elif own.signal is not None:
+            said.append(f"{own.signal} of {joint} of opposite sign")
+    return " and ".join(said)
+
+
+def _added(own: JointReading) -> str:
+    """Say what is added to a position, and what changes its sign."""
+    return f"{90 * own.quarters:+d} deg" + ("" if own.signal is None else f" ({own.signal} of opposite sign)")
 
 
 def refuse_exchanged(faults: Sequence[ChannelFault]) -> None:

@@ -78,6 +78,23 @@ class PreparedStretch:
         found.__dict__.update(shared, motion=replace(self.motion, torque=stretch.torque))
         return found
 
+    def with_positions_of(self, stretch: Stretch, factor: Array, shift: Array) -> PreparedStretch:
+        """Return it with a stretch whose positions are ``factor`` times these, 1 or -1, and ``shift``, shape (n,) each.
+
+        Filters are linear and keep what is constant, so that what these positions decide is shared.
+        """
+        sign = factor[:, None]
+        moved = replace(
+            self.motion,
+            q=sign * self.motion.q + shift[:, None],
+            v=sign * self.motion.v,
+            a=sign * self.motion.a,
+            torque=stretch.torque,
+        )
+        found = self.with_torque_of(stretch)
+        found.__dict__.update(motion=moved)
+        return found
+
     @made_once
     def motion(self) -> Motion:
         """Filtered position, velocity and acceleration on the whole time grid."""

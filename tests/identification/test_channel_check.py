@@ -12,7 +12,8 @@ from scara_ident.diagnosis import diagnose
 from scara_ident.errors import EstimationError, RecordingError
 from scara_ident.estimation.least_squares import weighted_value
 from scara_ident.estimation.observations import observe
-from scara_ident.identification.channel_check import _better, _pushing, _relative, channel_faults
+from scara_ident.identification.channel_check import channel_faults
+from scara_ident.identification.channel_comparison import friction_pushes, relative
 from scara_ident.identification.channel_fault import ChannelFault
 from scara_ident.identification.identify import identify
 from scara_ident.model.model import build_model
@@ -121,7 +122,7 @@ def test_an_effort_of_opposite_sign_shows_where_friction_is_slight(tmp_path: Pat
     wrong, model = turned(run, effort=(joint,)), build_model(robot, "basic")
     for bands in ((8.0,) * 3, tuple(0.8 if j == joint else 8.0 for j in range(3))):
         seen = observe(model, prepare([wrong], bands))
-        assert not np.any(_pushing(weighted_value(seen.by_joint), seen))
+        assert not np.any(friction_pushes(weighted_value(seen.by_joint), seen))
         (fault,) = channel_faults(seen)
         assert (fault.signal, fault.joints, fault.exchanged) == ("effort", (robot.joints[joint],), False)
         assert fault.mended < 0.1 < fault.error
@@ -166,7 +167,7 @@ def test_an_exchange_shows_where_one_torque_is_large_beside_the_other(tmp_path: 
     robot = load_robot(write_urdf(tmp_path / "arm.urdf", [PLANAR_2R[0], replace(PLANAR_2R[1], mass=0.3)]))
     runs = [noisy(swing(robot, f"s{seed}_1", seed, 12.0, 200.0), np.random.default_rng(seed), 0.02) for seed in (1, 2)]
     seen = observe(build_model(robot, "basic"), prepare([exchanged(run, "effort") for run in runs], (8.0, 8.0)))
-    errors = _relative(weighted_value(seen.by_joint), seen)
+    errors = relative(weighted_value(seen.by_joint), seen)
     assert np.min(errors) < 0.3 < np.max(errors)
     assert [(fault.signal, fault.exchanged) for fault in channel_faults(seen)] == [("effort", True)]
 
@@ -222,17 +223,6 @@ def test_fits_that_interpolate_are_not_compared(recordings: tuple[Recording, ...
         seen = observe(model, prepare([item], (1.0, 1.0)))
         assert seen.joints[0].table.shape[1] < 12
         assert channel_faults(seen) == ()
-
-
-def test_a_better_reading_has_to_be_better_block_by_block() -> None:
-    rng = np.random.default_rng(0)
-    left = np.exp(0.3 * rng.standard_normal((20, 2)))
-    assert _better(left, 0.5 * left)
-    assert not _better(left, left)
-    # One block that is far better, and none of the others: the mean falls, and nothing is shown.
-    once = left * np.where(np.arange(20) == 3, 1e-9, 1.0)[:, None]
-    assert not _better(left, once)
-    assert not _better(left[:1], 0.1 * left[:1])
 
 
 def test_an_exchange_shows_in_a_short_recording_of_enough_rows(recordings: tuple[Recording, ...]) -> None:

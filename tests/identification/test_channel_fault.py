@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from scara_ident.errors import RecordingError
-from scara_ident.identification.channel_fault import ChannelFault, Signal, merged, refuse_exchanged
+from scara_ident.identification.channel_fault import ChannelFault, faults_of, merged, refuse_exchanged
+from scara_ident.identification.channel_reading import JointReading, Signal
 
 JOINTS = ("a", "b", "c")
 
@@ -53,3 +54,26 @@ def test_only_what_no_parameter_survives_is_refused() -> None:
     ):
         with pytest.raises(RecordingError):
             refuse_exchanged([fault])
+
+
+def test_the_zeros_of_all_joints_are_one_fault_and_signs_of_others_their_own() -> None:
+    reading = JointReading(1, 1, 1), JointReading(-1), JointReading(1, -1, 2)
+    zeros, sign = faults_of(reading, JOINTS, 1.0, 0.01, ("gravity upside down",))
+    assert zeros.readings == {"a": reading[0], "c": reading[2]}
+    assert (sign.signal, sign.joints) == ("effort", ("b",))
+    said = str(zeros)
+    assert "falls from 100 to 1 % (as it does with gravity upside down)" in said
+    assert "with +90 deg on a and +180 deg (position of opposite sign) on c" in said
+    assert "negate position scale and offset of c in robot.yaml, then add in robot.yaml" in said
+    assert "offset: {a: 1.57080, c: 3.14159} in rad" in said
+    assert "\n" not in said
+
+
+def test_a_zero_and_a_sign_of_one_joint_are_one_fault() -> None:
+    """What was added before a sign turned round is taken off after it."""
+    (zero,) = faults_of((JointReading(), JointReading(1, 1, 1), JointReading()), JOINTS, 0.4, 0.1)
+    (fault,) = merged((zero, turned("position", "b")), JOINTS)
+    assert fault.readings == {"b": JointReading(1, -1, -1)}
+    (fault,) = merged((turned("position", "b"), zero), JOINTS)
+    assert fault.readings == {"b": JointReading(1, -1, 1)}
+    assert merged((zero, zero, zero, zero), JOINTS) == ()

@@ -136,9 +136,12 @@ def position_unit(samples: Samples) -> Checked:
         guess = f"it looks like {looks}" if fitting else "it is in no unit that the audit knows"
     others = [f"{robot.joints[k]}.position" for k in np.flatnonzero(suspect)[1:]]
     also = f" (and {', '.join(others)})" if others else ""
+    # What would be within its limits about another zero.
+    shifted = beyond[joint] > 0.0 and high[joint] - low[joint] <= reach[joint] and haste[joint] <= 1.0
+    zero = ", or add an offset to it in robot.yaml if it counts from another zero" if shifted else ""
     samples.refuse(
         f"{robot.joints[joint]}.position{also} {seen}: {guess}; convert it to {name}, "
-        f"or correct the limits in {robot.urdf.name} if they are wrong"
+        f"or correct the limits in {robot.urdf.name} if they are wrong{zero}"
     )
 
 

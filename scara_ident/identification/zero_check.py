@@ -1,0 +1,155 @@
+"""Do positions count from elsewhere by quarter turns, as by another maker's convention? It imitates signs and every effect."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.arrays import Array
+from scara_ident.estimation.least_squares import weighted_value
+from scara_ident.estimation.observations import Observations
+from scara_ident.estimation.urdf_gravity import near_axis, urdf_gravity
+from scara_ident.identification.channel_comparison import ALIKE, far_less, friction_pushes, held_out, mean
+from scara_ident.identification.channel_fault import ChannelFault, faults_of, in_words
+from scara_ident.identification.channel_reading import JointReading, Reading, as_mapped, has_zeros, observed_as
+from scara_ident.identification.few_rows import FewRows, few_rows
+from scara_ident.identification.reading_search import SAME, ZERO_COST, cost, searched
+from scara_ident.model.model import TorqueModel
+from scara_ident.model.terms.rigid_body import RigidBody, rigid_body
+
+# Readings that leave as much and are named; of more nothing is told.
+MOST_RIVALS = 2
+# Share of gravity by which another direction differs.
+SAME_GRAVITY = 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class WrongZeros:
+    """A reading with other zeros, and signs where these are wrong too, that leaves far less.
+
+    Attributes
+    ----------
+    reading : tuple of JointReading
+    rivals : tuple of str
+        In words, what leaves as much and is as simple.
+    error, mended : float
+        See `ChannelFault`.
+    left, few_left : float
+        What it leaves of the torque of all joints, geometric mean, on blocks that it was not fitted to, and of few rows.
+    observations : Observations
+    rows : FewRows
+        As mapped.
+    """
+
+    reading: Reading
+    rivals: tuple[str, ...]
+    error: float
+    mended: float
+    left: float
+    few_left: float
+    observations: Observations
+    rows: FewRows
+
+    def faults(self, joints: Sequence[str]) -> list[ChannelFault]:
+        """Return what is wrong with the mapping."""
+        return faults_of(self.reading, joints, self.error, self.mended, self.rivals)
+
+
+def wrong_zeros(
+    held: Observations, before: tuple[Array, Array], pushing: NDArray[np.bool_], most: float
+) -> WrongZeros | None:
+    """Return the reading with other zeros that explains recordings, if one does and neither signs nor gravity do as simply.
+
+    Where several do, what they have in common is told, and the next round looks at the rest.
+
+    Parameters
+    ----------
+    held : Observations
+    before : tuple of ndarray
+        What `held_out` says of them.
+    pushing : ndarray of bool, shape (n,)
+        Joints whose friction would feed energy in.
+    most : float
+        Share of the torque that a reading may leave at most.
+    """
+    rows = few_rows(held)
+    tried = searched(rows)
+    chosen, others = _simplest(tried)
+    if not has_zeros(chosen):
+        return None
+    # An arm that is mounted otherwise is as simple as one zero; to tell of that is not for the channels.
+    if _other_gravity(held, rows) * ALIKE <= tried[chosen]:
+        return None
+    found = _counted(held, before, pushing, most, rows, _common([chosen, *others])) if others else None
+    if found is not None or len(others) > MOST_RIVALS:
+        return found
+    rivals = tuple(in_words(other, held.model.robot.joints) for other in others)
+    return _counted(held, before, pushing, most, rows, chosen, rivals)
+
+
+def _counted(
+    held: Observations,
+    before: tuple[Array, Array],
+    pushing: NDArray[np.bool_],
+    most: float,
+    rows: FewRows,
+    reading: Reading,
+    rivals: tuple[str, ...] = (),
+) -> WrongZeros | None:
+    """Return a reading with other zeros if it counts on all rows, and friction pushes on no more joints."""
+    if not has_zeros(reading):
+        return None
+    other = observed_as(held, reading)
+    then = held_out(other)
+    said = far_less(before, then, most, poor=True)
+    pushed = np.count_nonzero(friction_pushes(weighted_value(other.by_joint), other))
+    if said is None or pushed > np.count_nonzero(pushing):
+        return None
+    return WrongZeros(reading, rivals, *said, mean(then[1]), mean(rows.left(reading)), other, rows)
+
+
+def _simplest(tried: dict[Reading, float]) -> tuple[Reading, list[Reading]]:
+    """Return the simplest of the readings that leave about the least, and others about as simple, the best first.
+
+    So is the one that leaves least, but where it has all of the simplest.
+    """
+    order = sorted(tried, key=tried.__getitem__)
+
+    def within(share: float, of: Reading) -> list[Reading]:
+        return [reading for reading in order if tried[reading] * share <= tried[of]]
+
+    chosen = min(within(ALIKE, order[0]), key=cost)
+    others = [one for one in within(ALIKE, chosen) if one != chosen and cost(one) <= cost(chosen) + 1]
+    best = min(within(1.0 - SAME, order[0]), key=cost)
+    if _common([best, chosen]) != chosen and cost(best) <= cost(chosen) + ZERO_COST:
+        others.insert(0, best)
+    return chosen, list(dict.fromkeys(others))
+
+
+def _common(readings: Sequence[Reading]) -> Reading:
+    """Return what readings have in common, joint by joint; as mapped elsewhere."""
+    return tuple(each[0] if len(set(each)) == 1 else JointReading() for each in zip(*readings, strict=True))
+
+
+def _other_gravity(held: Observations, rows: FewRows) -> float:
+    """Return what is left at least where the arm stands otherwise: gravity along an axis of the base, or as the URDF's bodies show it."""
+    robot = held.model.robot
+    stated = np.asarray(robot.model.gravity.linear, dtype=float)
+    size = float(np.linalg.norm(stated))
+    directions = [size * side * axis for axis in np.eye(3) for side in (1.0, -1.0)]
+    shown = urdf_gravity(held)
+    if shown is not None and np.linalg.norm(shown.found) > 0.0:
+        directions.append(size * near_axis(shown.found / np.linalg.norm(shown.found)))
+    least = np.inf
+    for gravity in directions if size > 0.0 else ():
+        if np.linalg.norm(gravity - stated) > SAME_GRAVITY * size:
+            model = robot.model.copy()
+            model.gravity.linear = gravity
+            standing = replace(robot, model=model)
+            terms = (rigid_body(standing) if isinstance(own, RigidBody) else own for own in held.model.terms)
+            other = replace(rows, model=TorqueModel(held.model.name, standing, tuple(terms)), _left={})
+            least = min(least, mean(other.left(as_mapped(robot.n))))
+    return least
