@@ -17,6 +17,8 @@ SLOWER = (0.03, 0.08, 0.2)
 # Functions of the state taken off at the most, the share of the squared residual that one removes at the least, what harm
 # counts against gain, and standard deviations beyond which a bin's weight falls.
 MOST_FEATURES, LEAST_GAIN, HARM, INFLUENCE = 6, 0.02, 0.5, 10.0
+# Share of a whole sum that is nothing but its rounding, where all of it is taken off again.
+NOTHING = 1e-9
 # A trend is fitted to one of so many bins, of which there are so many for each of its columns, in so many rounds.
 THIN, LEAST_BINS, ROUNDS = 2, 10, 7
 # Numbers in the columns of the trends that are fitted together: more would leave the cache.
@@ -190,7 +192,7 @@ def _of_others(
         weighted = columns * use
         scores, squares = (np.add.reduceat(weighted * more, starts, axis=1) for more in (off, columns))
         away = _not_near(squares)
-        value = _not_near(scores) / np.where(away > 0.0, away, np.inf)
+        value = _not_near(scores) / np.where(away > NOTHING * np.sum(squares, axis=1, keepdims=True), away, np.inf)
         gains = np.add.reduceat(2.0 * value * scores - value**2 * squares, firsts, axis=1)
         # Where it does harm to one recording it is not that recording's doing.
         gains[gains < 0.0] *= HARM
@@ -201,7 +203,8 @@ def _of_others(
         own = columns[chosen]
         normal = _not_near(np.add.reduceat(own[:, None] * (own * use), starts, axis=2))
         right = _not_near(np.add.reduceat(own * use * left, starts, axis=1))
-        normal += 1e-6 * np.trace(normal) * np.eye(len(own))[:, :, None] + 1e-300
+        least = NOTHING * float(np.sum(own * own * use)) + np.finfo(float).tiny
+        normal += (1e-6 * np.maximum(np.trace(normal), 0.0) + least) * np.eye(len(own))[:, :, None]
         values = np.linalg.solve(normal.transpose(2, 0, 1), right.T[:, :, None])[:, :, 0].T
         fitted = np.sum(np.repeat(values, counts, axis=1) * own, axis=0)
         helps = np.add.reduceat(use * (off**2 - (left - fitted) ** 2), starts[firsts]) > 0.0

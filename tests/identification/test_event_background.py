@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from scara_ident.identification.binned_residual import Binned, binned
-from scara_ident.identification.event_background import without_states, without_trends
+from scara_ident.identification.event_background import _of_others, without_states, without_trends
 from scara_ident.motion.prepared import prepare
 from scara_ident.robot.robot import load_robot
 from tests.arms import swing
@@ -143,3 +143,15 @@ def test_the_trend_of_a_run_without_noise_is_what_it_is():
     left = after.left - odd
     assert np.sqrt(np.mean(left**2)) < 0.2
     assert np.all(np.isfinite(after.left))
+
+
+def test_what_no_other_part_says_anything_of_is_left_alone():
+    """Of the third of four parts only the first might, as those beside it do not count: next to nothing, over nothing, is a lot."""
+    rng = np.random.default_rng(0)
+    starts, known = np.arange(0, 160, 40), np.ones(160, dtype=bool)
+    columns = rng.standard_normal((6, 160))
+    columns[:, :40] *= 1e-10
+    left = 0.7 * columns[0] + 0.3 * columns[3] + 0.01 * rng.standard_normal(160)
+    with np.errstate(over="raise", invalid="raise"):
+        taken = _of_others(columns, left, known, starts, np.array([0]))
+    assert np.max(np.abs(taken[80:120])) < 0.1
