@@ -25,6 +25,9 @@ CLOCKS = ("time", "__time", "timestamp", "t")
 # Of a format in SI: when the state was measured, and when it was received.
 STATED_CLOCKS = ("time", "receive_time")
 
+# What to do where a log has a file for every quantity.
+APART = "where they are in a file of their own, put the columns of both side by side in one"
+
 
 @dataclass
 class Guess:
@@ -91,11 +94,12 @@ def guess(
             if nameless(meanings)
             else ""
         )
-        result.problems.append(f"no positions found: name their columns under recording: position{listed}")
+        apart = f"; {APART}" if effort is not None else ""
+        result.problems.append(f"no positions found: name their columns under recording: position{listed}{apart}")
         return result
     result.joints = [k for k in range(robot.n) if k in position.columns and (effort is None or k in effort.columns)]
     if effort is None:
-        result.notes.append("no efforts found: the file cannot be identified from")
+        result.notes.append(f"no efforts found: the file cannot be identified from; {APART}")
     if not result.joints:
         result.problems.append("no joint has both a position and an effort")
         return result

@@ -94,3 +94,14 @@ def test_a_file_without_an_arm_says_what_is_missing(tmp_path):
     assert "position" in found.problems[1]
     # The draft is still a description that loads, but for the side of effort.
     assert yaml.safe_load(found.description or "")["urdf"]
+
+
+def test_positions_and_efforts_in_files_of_their_own_are_to_be_put_into_one(tmp_path):
+    urdf = two_joints(tmp_path)
+    parts = {kind: {name: values for name, values in MADE.items() if kind in name} for kind in ("position", "effort")}
+    positions = inspected(save(tmp_path / "q.csv", {"time": MADE["time"], **parts["position"]}), tmp_path, urdf)
+    assert any("no efforts found" in note and "side by side in one" in note for note in positions.notes)
+    efforts = inspected(save(tmp_path / "tau.csv", {"time": MADE["time"], **parts["effort"]}), tmp_path, urdf)
+    assert any("no positions found" in problem and "side by side in one" in problem for problem in efforts.problems)
+    neither = inspected(save(tmp_path / "t.csv", {"time": MADE["time"]}), tmp_path, urdf)
+    assert not any("side by side" in problem for problem in neither.problems)
