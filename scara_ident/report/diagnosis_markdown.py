@@ -10,6 +10,7 @@ import numpy as np
 from scara_ident.diagnosis.diagnose import Diagnosis
 from scara_ident.estimation.run_variation import unit_of_kind
 from scara_ident.report.diagnosis import diagnosis_dict
+from scara_ident.report.left_out import left_out_words
 
 
 def diagnosis_markdown(
@@ -41,6 +42,7 @@ def diagnosis_markdown(
                 for joint, before in part.get("before_own_offset", {}).items()
             ]
             lines += _table(f"Error on the {kind} recordings", head, rows)
+    lines += ["", left_out_words(content)]
     if pictures:
         lines += ["", "## Residual before and after"]
         for title, name in pictures:

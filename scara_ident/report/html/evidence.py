@@ -10,6 +10,7 @@ import numpy as np
 from scara_ident.estimation.run_variation import KINDS, RunVariation, unit_of_kind
 from scara_ident.identification.events import Event
 from scara_ident.report.html.blocks import Block, Cell, Folded, Paragraph, Table, Tag, chance, name, number
+from scara_ident.report.left_out import left_out_words
 from scara_ident.robot.robot import Robot
 
 RECORDINGS = (("validation", "held out"), ("training", "training"))
@@ -51,7 +52,7 @@ def gain_blocks(content: Mapping[str, Any], robot: Robot) -> list[Block]:
         for j, joint in enumerate(robot.joints)
         for when in times
     ]
-    said = "Rms residual within the band. Held-out recordings took no part in any choice; the noise floor is what does not repeat."
+    said = f"Rms residual within the band. {left_out_words(content)} Held-out recordings took no part in any choice; the noise floor is what does not repeat."
     if any("after_own_offset" in content[kind] for kind, _ in RECORDINGS):
         said += " Offsets of the torques differ from recording to recording: own offsets is what is left beside one of each's own."
     return [

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from scara_ident.diagnosis.diagnose import Diagnosis
 from scara_ident.manners import several
 from scara_ident.report.diagnosis import diagnosis_dict
+from scara_ident.report.left_out import left_out_words
 from scara_ident.report.told.words import table, text_of
 
 if TYPE_CHECKING:
@@ -66,6 +67,7 @@ def tables(held: dict[str, Any], *, all_candidates: bool = False) -> list[Table]
         for joint, before in held[kind].get("before_own_offset", {}).items():
             after = held[kind]["after_own_offset"][joint]
             errors.add_row(f"{kind}, own offsets", joint, _number(before), _number(after))
+    errors.caption, errors.caption_justify = left_out_words(held) or None, "left"
     rows = table("candidates", "candidate", "gain", "p", "why", right=("gain", "p"))
     tried = held["candidates"]
     # One that chance explains says nothing that the others do not.

@@ -38,13 +38,15 @@ def errors(effects: list[Any]) -> dict[str, Any]:
         "training": part,
         "validation": {**part, "before": {}},
         "noise_floor": {"joint1": 0.004},
+        "left_out": {"training": {"joint1": 0.11, "joint2": 0.23}, "validation": {}},
         "recordings": {"training": {"A_1": run}, "validation": {}},
     }
 
 
 @pytest.mark.parametrize("effects", [["spring"], []])
 def test_what_is_left_is_after_over_before_and_without_effects_there_is_one_error(effects):
-    _, table, folded = gain_blocks(errors(effects), ROBOT)
+    said, table, folded = gain_blocks(errors(effects), ROBOT)
+    assert "11 to 23 % of the time is left out" in said.text
     assert isinstance(table, Table)
     first = [cell.text if isinstance(cell, Cell) else cell for cell in table.rows[0]]
     if effects:
