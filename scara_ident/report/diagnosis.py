@@ -84,6 +84,7 @@ def diagnosis_dict(diagnosis: Diagnosis, worth: Mapping[str, Any] | None = None)
                 "noise": item.shown,
                 "by": item.by,
                 "why": item.why,
+                "lacks": item.lacks,
                 "detection_limit": None if np.isnan(item.limit) else item.limit,
             }
             for item in diagnosis.evidence

@@ -11,6 +11,7 @@ from scara_ident.diagnosis.effect_parameters import RotorInertia
 from scara_ident.diagnosis.evidence import Evidence
 from scara_ident.diagnosis.found_effect import FoundEffect
 from scara_ident.diagnosis.held_out_gain import shown_of, words_of
+from scara_ident.diagnosis.next_steps import next_steps
 from scara_ident.diagnosis.outcome import Unexplained
 from scara_ident.effects import Parameter
 from scara_ident.estimation.run_offsets import rms_of
@@ -32,8 +33,7 @@ def sentences(diagnosis: Diagnosis) -> tuple[str, ...]:
     if diagnosis.verdict == "complete":
         found.append("The model lacks nothing that these recordings can show.")
     if diagnosis.verdict == "undecided":
-        more = "something more is missing than was found" if diagnosis.effects else "something is missing"
-        found.append(f"Undecided: these recordings cannot tell whether {more}.")
+        found.append(_undecided(diagnosis))
         found += _not_shown(diagnosis.evidence)
     for effect in diagnosis.effects:
         found += _found(effect, diagnosis)
@@ -82,6 +82,8 @@ def sentences(diagnosis: Diagnosis) -> tuple[str, ...]:
             f"Unexplained: on {remainder.joint} a remainder of {remainder.rms:.3g} {unit} rms {on}; "
             f"no effect of the catalogue accounts for it{_curved(diagnosis, remainder)}."
         )
+        if not remainder.signals:
+            found += [f"To do first: {step.sentence()}" for step in next_steps(diagnosis)[:1]]
     seen = diagnosis.after, diagnosis.training_after
     found.append(scale_sentence(urdf_scale(*seen), diagnosis.robot, unlike_urdf(*seen)))
     gravity = gravity_sentence(urdf_gravity(diagnosis.training_before))
@@ -107,6 +109,15 @@ def _curved(diagnosis: Diagnosis, remainder: Unexplained) -> str:
     return ""
 
 
+def _undecided(diagnosis: Diagnosis) -> str:
+    """Say whether it is open that something is missing, or only what it is."""
+    lacking = [item.joint for item in diagnosis.evidence if item.lacks]
+    more = "something more is missing than was found" if diagnosis.effects else "something is missing"
+    if lacking:
+        return f"Undecided: {more}, on {' and '.join(lacking)}, that these recordings cannot name."
+    return f"Undecided: these recordings cannot tell whether {more}."
+
+
 def _not_shown(evidence: Sequence[Evidence]) -> list[str]:
     """Say why what is left was not shown to be noise, joints with the same reason together."""
     groups: dict[str, list[tuple[str, str]]] = {}
@@ -127,14 +138,18 @@ def _found(effect: FoundEffect, diagnosis: Diagnosis) -> list[str]:
     """Say what an effect is and how large, and what the recordings held out show of it."""
     gain, criteria = effect.held_out, diagnosis.search.step.criteria
     values = ", ".join(quantity(name, parameter) for name, parameter in effect.parameters.items())
-    unsure = "" if effect.size_told else ", so that it is there is told, but not how large it is"
-    said = f"{effect.title}: {effect.description}; {values}{unsure}"
+    said = f"{effect.title}: {effect.description}; {values}"
+    doubted = gain is not None and gain.against(criteria)
+    if not effect.size_told and not doubted:
+        # As little as p may be, it is more than nothing.
+        chance = f"p = {effect.p_value:.1e}" if effect.p_value else "p < 1e-300"
+        said += f"; it is there by what it removes ({chance}), but its size is not settled"
     if gain is None:
         return [f"Found {said}."]
     if gain.borne_out(criteria):
         return [f"Found {said}; {shown_of(gain)} on the recordings held out."]
     words = words_of(gain, diagnosis.robot.torque_unit(diagnosis.robot.joints.index(gain.joint)))
-    if gain.against(criteria):
+    if doubted:
         instead = "record further motions to fit"
         return [f"In doubt: {said}.", f"Not borne out by the recordings held out: {words}; {instead}."]
     return [f"Found {said}.", f"Not confirmed by the recordings held out: {words}."]

@@ -6,6 +6,9 @@ from dataclasses import replace
 
 from scara_ident.diagnosis import diagnose
 from scara_ident.diagnosis.effect_parameters import RotorInertia
+from scara_ident.diagnosis.held_out_gain import HeldOutGain
+from scara_ident.diagnosis.next_steps import next_steps
+from scara_ident.diagnosis.outcome import Unexplained
 from scara_ident.report.diagnosis import diagnosis_dict
 from scara_ident.report.diagnosis_words import sentences
 from scara_ident.robot.robot import load_robot
@@ -37,6 +40,9 @@ def test_where_it_cannot_be_told_the_first_sentence_says_so(result):
     )
     assert sentences(replace(undecided, evidence=both))[1] == "On joint1, joint2: 26% to 76% of it is not white."
     assert sentences(replace(undecided, evidence=both[:1]))[1] == "On joint1: 76% of it is not white."
+    lacking = replace(undecided, evidence=(replace(unsure, lacks=True), result.evidence[1]))
+    assert sentences(lacking)[0] == "Undecided: something is missing, on joint1, that these recordings cannot name."
+    assert diagnosis_dict(lacking)["evidence"]["joint1"]["lacks"] is True
     found, *_ = sentences(replace(undecided, effects=result.effects))
     assert found == "Undecided: these recordings cannot tell whether something more is missing than was found."
 
@@ -78,6 +84,21 @@ def test_an_effect_that_is_there_and_whose_size_is_not_told_says_so(result):
     (effect,) = result.effects
     assert diagnosis_dict(result)["effects"][0]["size_told"] is True
     unsure = replace(result, effects=(replace(effect, size_told=False),))
-    assert "but not how large it is" in " ".join(sentences(unsure))
-    assert "but not how large it is" not in " ".join(sentences(result))
+    said = f"it is there by what it removes (p = {effect.p_value:.1e}), but its size is not settled"
+    assert said in " ".join(sentences(unsure))
+    assert "not settled" not in " ".join(sentences(result))
+    # What those held out speak against is not said to be there.
+    against = HeldOutGain(-0.3, 0.1, 0.05, "joint2", 0.02, 0.03)
+    doubted = " ".join(sentences(replace(result, effects=(replace(effect, size_told=False, held_out=against),))))
+    assert "In doubt: spring on joint2" in doubted
+    assert "not settled" not in doubted
     assert diagnosis_dict(unsure)["effects"][0]["size_told"] is False
+
+
+def test_where_what_is_left_depends_on_no_signal_it_is_said_what_to_do_first(result):
+    left = replace(result, verdict="unexplained", unexplained=Unexplained("joint1", (), 0.1, 0.0))
+    said = sentences(left)
+    place = next(k for k, words in enumerate(said) if words.endswith("no effect of the catalogue accounts for it."))
+    assert said[place + 1] == f"To do first: {next_steps(left)[0].sentence()}"
+    shown = replace(left, unexplained=Unexplained("joint1", ("position of joint1",), 0.1, 0.5))
+    assert not any(words.startswith("To do first") for words in sentences(shown))

@@ -143,8 +143,7 @@ def evidence_blocks(content: Mapping[str, Any]) -> Sequence[Block]:
     ]
     words = (
         "That nothing was found says little where nothing could have been found. Of the effects tried on a joint, half would "
-        "have had to remove at least the detection limit, a share of its squared residual, to come in. Torques are rms, "
-        "in N m or, of a joint that slides, in N."
+        "have had to remove at least the detection limit, a share of its squared residual, to come in. Torques are rms."
     )
     return [Paragraph(words), Table(("joint", "what is left", "detection limit", "why"), rows, (2,))]
 
