@@ -16,7 +16,7 @@ from scara_ident.diagnosis.outcome import Unexplained
 from scara_ident.effects import Parameter
 from scara_ident.estimation.run_offsets import rms_of
 from scara_ident.estimation.urdf_gravity import gravity_sentence, urdf_gravity
-from scara_ident.estimation.urdf_scale import scale_sentence, unlike_urdf, urdf_scale
+from scara_ident.estimation.urdf_scale import told_scale
 from scara_ident.model.terms.friction import Friction
 from scara_ident.report.identification import bias_said
 from scara_ident.robot.rotors import GUESS_FACTOR
@@ -84,8 +84,7 @@ def sentences(diagnosis: Diagnosis) -> tuple[str, ...]:
         )
         if not remainder.signals:
             found += [f"To do first: {step.sentence()}" for step in next_steps(diagnosis)[:1]]
-    seen = diagnosis.after, diagnosis.training_after
-    found.append(scale_sentence(urdf_scale(*seen), diagnosis.robot, unlike_urdf(*seen)))
+    found.append(told_scale(diagnosis.after, diagnosis.training_after))
     gravity = gravity_sentence(urdf_gravity(diagnosis.training_before))
     if gravity is not None:
         found.append(gravity)
