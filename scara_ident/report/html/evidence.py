@@ -155,8 +155,8 @@ def events_blocks(robot: Robot, events: Sequence[Event]) -> Sequence[Block]:
             name(event.recording),
             f"{event.start:.2f}",
             f"{event.stop:.2f}",
-            ", ".join(event.joints),
-            f"{number(event.rms)} {robot.torque_unit(robot.joints.index(event.joints[0]))}",
+            ", ".join([*(joint for joint, _ in event.sized), *event.joints[len(event.sized) :]]),
+            ", ".join(f"{number(size)} {robot.torque_unit(robot.joints.index(joint))}" for joint, size in event.sized),
             event.kind,
             "–" if event.force is None else f"{np.linalg.norm(event.force):.3g} N",
             "held out" if event.held_out else "left out of the fit",
@@ -165,7 +165,7 @@ def events_blocks(robot: Robot, events: Sequence[Event]) -> Sequence[Block]:
     ]
     words = (
         "Stretches, or whole recordings, that are not explained while others are: no parameter, but something that happened. "
-        "Times are seconds since the recording began; the size is the rms on the first joint, the force what a constant one at "
+        "Times are seconds since the recording began; the size is the rms on each joint, the force what a constant one at "
         "the tool would have to be."
     )
     head = ("recording", "from [s]", "to [s]", "joints", "rms", "kind", "force", "")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -168,6 +169,8 @@ def test_each_event_has_its_row():
     assert shown[0][:4] == ["run_3", "4.20", "5.10", "joint1, joint2"]
     assert shown[0][5:] == ["contact", "5 N", "left out of the fit"]
     assert shown[1][5:] == ["other payload", "–", "held out"]
+    _, table = events_blocks(ROBOT, (replace(PUSH, sizes=(6.1, 7.2)),))
+    assert list(table.rows[0][3:5]) == ["joint2, joint1", "7.20 N m, 6.10 N m"]
 
 
 def test_without_events_nothing_is_shown():
