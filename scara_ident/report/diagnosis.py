@@ -146,6 +146,17 @@ def best_by_label(decisions: Sequence[Decision]) -> list[Decision]:
     return sorted(best.values(), key=lambda item: -item.gain)
 
 
+def beyond_chance(candidates: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+    """Return the candidates that chance does not explain: one that it does says nothing that others do not.
+
+    Parameters
+    ----------
+    candidates : sequence of mapping
+        Those of ``diagnosis.json``.
+    """
+    return [row for row in candidates if row["p_value"] < 1.0]
+
+
 def _candidate(decision: Decision, diagnosis: Diagnosis) -> dict[str, Any]:
     scene = diagnosis.search.scene
     helps, voting = decision.examination.votes
