@@ -32,7 +32,7 @@ from scara_ident.diagnosis.selection_step import SelectionStep, observed
 from scara_ident.estimation.least_squares import value_and_weights
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.motion.prepared import PreparedData, prepare
-from scara_ident.report.diagnosis import quantity, sentences
+from scara_ident.report.diagnosis_words import quantity, sentences
 
 HOLDS = 0.97
 ARMS = ("ur10e", "emps", "double_pendulum_c1", "double_pendulum_a0")

@@ -49,6 +49,8 @@ class Evidence:
     limit : float
         Share of its square that half of the effects tried on it would have to remove to come in; NaN where none was
         tried.
+    lacks : bool
+        Whether the model surely lacks something there: more repeats than filters and encoders may leave.
     """
 
     joint: str
@@ -56,6 +58,7 @@ class Evidence:
     by: str
     why: str
     limit: float
+    lacks: bool = False
 
 
 def evidence(
@@ -101,11 +104,20 @@ def evidence(
         own = item.candidate.member.joint
         for j in range(found.scene.robot.n) if own is None else (own,):
             doubts.setdefault(j, item.why)
-    return tuple(
+    robot = found.scene.robot
+    # Beyond the chance that one of all joints does.
+    lacks = [
+        joint in repeated
+        and repeated[joint].p_value * robot.n < criteria.family_error
+        and repeated[joint].missing > small[j]
+        for j, joint in enumerate(robot.joints)
+    ]
+    shown = (
         Evidence(joint, False, "", doubts[j], float(limits[j]))
         if j in doubts
         else _of_joint(
             joint,
+            robot.torque_unit(j),
             repeated.get(joint),
             float(coloured[j]),
             noise[j],
@@ -113,12 +125,14 @@ def evidence(
             (small[j], of_positions[j], times),
             criteria,
         )
-        for j, joint in enumerate(found.scene.robot.joints)
+        for j, joint in enumerate(robot.joints)
     )
+    return tuple(replace(item, lacks=own and not item.shown) for item, own in zip(shown, lacks, strict=True))
 
 
 def _of_joint(
     joint: str,
+    unit: str,
     fit: LackOfFit | None,
     coloured: float,
     noise: str,
@@ -135,16 +149,15 @@ def _of_joint(
         why = f"{effect} would have been significant: record more"
         return Evidence(joint, False, "", why, limit)
     if fit is not None and repeats and fit.missing > small:
-        why = f"{fit.missing:.3g} repeats (p = {fit.p_value:.1e}) beside {fit.noise:.3g} that does not: "
-        why += "too much for filters and encoders alone, too little to tell what it is"
+        why = f"{_beside(fit, unit)}: more than filters and encoders alone leave, but too little to tell what it is"
         return Evidence(joint, False, "repetition", why, limit)
     if fit is not None and fit.most_missing <= criteria.remainder_to_noise * fit.noise:
-        why = f"repetitions leave at most {fit.most_missing:.3g} that repeats, and {fit.noise:.3g} that does not"
+        why = f"repetitions leave at most {fit.most_missing:.3g} {unit} that repeats, and {fit.noise:.3g} {unit} that does not"
         return Evidence(joint, True, "repetition", why, limit)
     if fit is not None and repeats and fit.missing > max(of_effects * fit.noise, max(1.0, of_effects) * of_positions):
         # A ripple at many speeds is as white as noise, and repeats.
-        why = f"{fit.missing:.3g} repeats (p = {fit.p_value:.1e}) beside {fit.noise:.3g} that does not, white as it may be: "
-        why += "as little of the torque as filters and encoders may leave, and more than noise"
+        why = f"{_beside(fit, unit)}: no noise, even where it is white, but filters and encoders may leave as much, "
+        why += "so this alone does not say that the model lacks something"
         return Evidence(joint, False, "repetition", why, limit)
     if coloured <= criteria.least_colour:
         why = f"at most {max(coloured, 0.0):.0%} of its power stands out from {noise} within the band"
@@ -153,9 +166,15 @@ def _of_joint(
     why += (
         "no trajectory is repeated that would tell whether it repeats"
         if fit is None
-        else f"up to {fit.most_missing:.3g} of it may repeat, where {fit.noise:.3g} does not"
+        else f"up to {fit.most_missing:.3g} {unit} of it may repeat, where {fit.noise:.3g} {unit} does not"
     )
     return Evidence(joint, False, "", why, limit)
+
+
+def _beside(fit: LackOfFit, unit: str) -> str:
+    """Say what repeats beside what does not."""
+    chance = f"p = {fit.p_value:.1e}"
+    return f"{fit.missing:.3g} {unit} repeats from run to run ({chance}) beside {fit.noise:.3g} {unit} that does not"
 
 
 def held_out_evidence(

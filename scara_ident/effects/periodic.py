@@ -77,6 +77,10 @@ class TorqueRipple(PerMotorTurn):
     of_state = True
     experiment = "move slowly at constant speed over several motor turns and record at a high rate"
 
+    def description(self, scene: Scene, member: Member) -> str:
+        """Say one period as one."""
+        return super().description(scene, member).replace(" of 1 periods ", " of 1 period ")
+
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
         """Return sine and cosine of the order times the motor's angle."""
         j, order = member.place, member.nonlinear[0]
@@ -110,6 +114,10 @@ class EncoderEccentricity(PerMotorTurn):
     of_state = True
     experiment = "run at two constant speeds: an error of the encoder grows with the square of speed, ripple does not"
     orders = ENCODER_ORDERS
+
+    def description(self, scene: Scene, member: Member) -> str:
+        """Say one time as once."""
+        return super().description(scene, member).replace(" errs 1 times ", " errs once ")
 
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
         """Return the change of torque per amplitude of sine and of cosine."""

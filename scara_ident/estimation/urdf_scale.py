@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import pinocchio as pin
 
 from scara_ident.estimation.estimate import Estimate
 from scara_ident.estimation.observations import Observations
+from scara_ident.model.regressor.kernel import configurations
 from scara_ident.model.urdf_values import urdf_values
 from scara_ident.robot.robot import Robot
 
@@ -16,10 +18,14 @@ from scara_ident.robot.robot import Robot
 MOST_LEFT = 0.5
 # A scale is told where it is so many of its standard deviations.
 SURE = 5.0
+# Torques of gravity below this, N m for each kg, are rounding.
+ROUNDING = 1e-9
 # A scale within this factor of 1 is what a URDF with rough masses gives.
 USUAL = 2.0
 # Joints within this factor of their middle are scaled alike.
 ALIKE = 1.5
+# Torque of the bodies below this share of that of the joint that bears most is as much as a centre of mass a little off makes.
+SLIGHT = 0.01
 
 
 @dataclass(frozen=True)
@@ -36,12 +42,16 @@ class JointScale:
         Whether what is left is told from zero.
     left : float
         Share of the identified torque that the URDF's does not explain in any scale.
+    torque, nominal : float
+        Rms of the identified torque and of the URDF's, N m or N.
     """
 
     scale: float
     told: bool
     sure: bool
     left: float
+    torque: float = np.nan
+    nominal: float = np.nan
 
 
 def urdf_scale(estimate: Estimate, observations: Observations) -> dict[str, float]:
@@ -90,11 +100,33 @@ def joint_scales(estimate: Estimate, observations: Observations) -> dict[str, Jo
         left = float(np.linalg.norm(identified - scale * nominal))
         spread = float(np.sum(columns * (estimate.covariance[np.ix_(own, own)] @ columns)))
         sure = left > SURE * np.sqrt(max(0.0, spread))
-        found[joint] = JointScale(scale, abs(scale) > SURE * std, sure, left / own_size if own_size else np.inf)
+        count = np.sqrt(nominal.size)
+        left = left / own_size if own_size else np.inf
+        found[joint] = JointScale(scale, abs(scale) > SURE * std, sure, left, own_size / count, np.sqrt(size) / count)
     return found
 
 
-def scale_sentence(scales: Mapping[str, float] | None, robot: Robot, unlike: Sequence[str] = ()) -> str:
+def slight_joints(estimate: Estimate, observations: Observations) -> tuple[str, ...]:
+    """Return the joints on which the bodies take so little torque that its scale says nothing of the efforts'.
+
+    By the URDF and as identified, beside what the URDF has on the joint that bears most, of those with torques of one unit.
+    """
+    robot = observations.model.robot
+    each = joint_scales(estimate, observations)
+    units = {joint: robot.torque_unit(robot.joints.index(joint)) for joint in each}
+    most = {unit: max(each[joint].nominal for joint in each if units[joint] == unit) for unit in set(units.values())}
+    return tuple(joint for joint, own in each.items() if max(own.torque, own.nominal) < SLIGHT * most[units[joint]])
+
+
+def told_scale(estimate: Estimate, observations: Observations) -> str:
+    """Say how the scale of the identified bodies compares with the URDF's."""
+    seen = estimate, observations
+    return scale_sentence(urdf_scale(*seen), observations.model.robot, unlike_urdf(*seen), slight_joints(*seen))
+
+
+def scale_sentence(
+    scales: Mapping[str, float] | None, robot: Robot, unlike: Sequence[str] = (), slight: Sequence[str] = ()
+) -> str:
     """Say what scale recordings cannot tell, and how the URDF's compares, where scales are given.
 
     Parameters
@@ -104,21 +136,44 @@ def scale_sentence(scales: Mapping[str, float] | None, robot: Robot, unlike: Seq
     robot : Robot
     unlike : sequence of str, optional
         See `unlike_urdf`.
+    slight : sequence of str, optional
+        See `slight_joints`: nothing is asked for their sake.
     """
-    said = _compared(scales, robot)
+    said = _compared(scales, robot, slight)
     if not scales or not unlike:
         return said
     return f"{said} On {', '.join(unlike)} they are not the URDF's in any scale."
 
 
-def _compared(scales: Mapping[str, float] | None, robot: Robot) -> str:
+def gravity_acts(robot: Robot) -> bool:
+    """Whether gravity makes a torque on some joint: its acceleration is known, so it tells the scale of time."""
+    steps = np.linspace(-1.0, 1.0, 4)
+    states = configurations(robot.model, np.outer(np.arange(1.0, robot.model.nv + 1.0), steps))
+    torques = [pin.computeGeneralizedGravity(robot.model, robot.model.createData(), state) for state in states.T]
+    bodies = sum(body.mass for body in robot.model.inertias)
+    return bool(np.max(np.abs(torques)) > ROUNDING * bodies)
+
+
+def _compared(scales: Mapping[str, float] | None, robot: Robot, slight: Sequence[str]) -> str:
     geared = np.any(robot.reduction != 1.0)
-    rest = "effort_gain, effort_side and the clock" if geared else "effort_gain and the clock"
-    said = f"No recording tells a scale common to all torques and masses, nor, without gravity, that of time: they rest on {rest}"
+    said = "No recording tells a scale common to all torques and masses"
+    if gravity_acts(robot):
+        said += f": it rests on {'effort_gain and effort_side' if geared else 'effort_gain'}"
+    else:
+        rest = "effort_gain, effort_side and the clock" if geared else "effort_gain and the clock"
+        said += f", nor, without gravity, that of time: they rest on {rest}"
     if scales is None:
         return f"{said}."
     if not scales:
         return f"{said}; the URDF's masses do not show in these torques."
+    # A scale that all joints share is one, whatever each of them bears.
+    shared = _alike(scales.values()) and any(joint not in slight for joint in scales)
+    little = {joint: scales[joint] for joint in slight if joint in scales and not 1.0 / USUAL < scales[joint] < USUAL}
+    if little and not shared:
+        others = {joint: scale for joint, scale in scales.items() if joint not in little}
+        few = ", ".join(f"{scale:.2g} times the URDF's on {joint}" for joint, scale in little.items())
+        begun = f"{_compared(others, robot, ())} They" if others else f"{said}. Torques of the bodies"
+        return f"{begun} are {few}, but so small there that a centre of mass a little off makes as much."
     size = np.array(list(scales.values()))
     turned = [joint for joint, scale in scales.items() if scale < 0.0]
     if turned:
@@ -133,7 +188,7 @@ def _compared(scales: Mapping[str, float] | None, robot: Robot) -> str:
         same = "those of the URDF" if spread == "1" else f"{spread} times the URDF's"
         return f"{said}. Torques of the bodies are {same}."
     asked = "are effort_gain and effort_side right?" if geared else "is effort_gain right?"
-    if np.all(size < ALIKE * middle) and np.all(size > middle / ALIKE):
+    if _alike(scales.values()):
         return f"{said}. All inertial parameters are {middle:.2g} of the URDF's: {asked}"
     odd = ", ".join(
         f"{scale:.2g} times the URDF's on {joint}"
@@ -141,3 +196,12 @@ def _compared(scales: Mapping[str, float] | None, robot: Robot) -> str:
         if not fits
     )
     return f"{said}. Torques of the bodies are {odd}: {asked}"
+
+
+def _alike(scales: Iterable[float]) -> bool:
+    """Whether scales are of one sign and within a factor of their middle."""
+    size = np.array(list(scales))
+    if np.any(size <= 0.0):
+        return False
+    middle = float(np.exp(np.median(np.log(size))))
+    return bool(np.all(size < ALIKE * middle) and np.all(size > middle / ALIKE))

@@ -70,6 +70,8 @@ class Event:
         What acts on the tool in a contact, in the base frame, N; a direction that the arm cannot feel is 0.
     begins, ends : tuple of float or None
         Between which times it begins, and ends, with 95 %; None of a whole recording.
+    sizes : tuple of float
+        Rms of the residual on each of the joints, N m or N; empty where only that of the first is known.
     """
 
     recording: str
@@ -83,6 +85,13 @@ class Event:
     force: tuple[float, float, float] | None = None
     begins: tuple[float, float] | None = None
     ends: tuple[float, float] | None = None
+    sizes: tuple[float, ...] = ()
+
+    @property
+    def sized(self) -> tuple[tuple[str, float], ...]:
+        """Joints of known size, the largest first."""
+        known = zip(self.joints, self.sizes or (self.rms,), strict=False)
+        return tuple(sorted(known, key=lambda item: -item[1]))
 
     @property
     def entry(self) -> dict[str, Any]:
@@ -95,6 +104,8 @@ class Event:
             "rms": self.rms,
             "kind": self.kind,
         }
+        if self.sizes:
+            found["rms_by_joint"] = dict(zip(self.joints, self.sizes, strict=True))
         for name, value in (("from_within", self.begins), ("to_within", self.ends)):
             if value is not None:
                 found[name] = [round(time, 3) for time in value]
@@ -107,10 +118,11 @@ class Event:
 
     def sentence(self, robot: Robot) -> str:
         """Return it in words."""
-        unit = robot.torque_unit(robot.joints.index(self.joints[0]))
         force = "" if self.force is None else f", {np.linalg.norm(self.force):.3g} N at the tool"
-        where = f"{self.rms:.3g} {unit} on {self.joints[0]}"
-        more = f" and {', '.join(self.joints[1:])}" if len(self.joints) > 1 else ""
+        units = dict(zip(robot.joints, map(robot.torque_unit, range(robot.n)), strict=True))
+        where = ", ".join(f"{size:.3g} {units[joint]} on {joint}" for joint, size in self.sized)
+        others = self.joints[len(self.sized) :]
+        more = f" and {', '.join(others)}" if others else ""
         done = "" if self.held_out else "; left out of the fit"
         if np.isinf(self.score):
             return f"{self.recording} is explained much worse than the recordings fitted ({self.kind}): {where}{more}{done}"
@@ -287,6 +299,7 @@ def _event(robot: Robot, data: PreparedData, segment: Segment, left: Array, *, h
         (float(force[0]), float(force[1]), float(force[2])) if kind == "contact" else None,
         begins,
         ends,
+        tuple(float(size[j]) for j in ranked),
     )
 
 

@@ -59,8 +59,9 @@ def held_out_events(value: Array, training: Observations, held_out: Observations
         joints = tuple(training.model.robot.joints[j] for j in shown)
         time = item.data.sources[0].time
         kind = "other payload" if payload_share(value, item, whole) >= PAYLOAD_FITS else "unknown"
+        sizes = tuple(float(rms[j]) for j in shown)
         found.append(
-            Event(item.name, 0.0, float(time[-1] - time[0]), joints, float(rms[shown[0]]), kind, held_out=True)
+            Event(item.name, 0.0, float(time[-1] - time[0]), joints, sizes[0], kind, held_out=True, sizes=sizes)
         )
     whole_ones = {event.recording for event in found}
     return (*found, *(event for event in within if event.recording not in whole_ones))

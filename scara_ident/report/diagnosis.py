@@ -1,4 +1,4 @@
-"""What a diagnosis tells: the contract's JSON, and the story in Markdown."""
+"""What a diagnosis tells: the contract's JSON."""
 
 from __future__ import annotations
 
@@ -10,29 +10,20 @@ import numpy as np
 from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.diagnose import Diagnosis
 from scara_ident.diagnosis.effect_parameters import RotorInertia
-from scara_ident.diagnosis.evidence import Evidence, least_found
+from scara_ident.diagnosis.evidence import least_found
 from scara_ident.diagnosis.found_effect import FoundEffect
-from scara_ident.diagnosis.held_out_gain import shown_of, words_of
 from scara_ident.diagnosis.next_steps import next_steps
-from scara_ident.diagnosis.outcome import Unexplained
 from scara_ident.diagnosis.questions import suspects_in_model
 from scara_ident.diagnosis.torque_noise import noise_density
-from scara_ident.effects import Parameter
 from scara_ident.estimation.estimate import joint_errors
 from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.run_offsets import rms_of
-from scara_ident.estimation.urdf_gravity import gravity_sentence, urdf_gravity
-from scara_ident.estimation.urdf_scale import scale_sentence, unlike_urdf, urdf_scale
+from scara_ident.estimation.urdf_scale import urdf_scale
 from scara_ident.export.result import KEY, rebuild_entry
-from scara_ident.model.terms.friction import Friction
 from scara_ident.model.urdf_values import urdf_values
-from scara_ident.report.identification import bias_of, bias_said
-from scara_ident.robot.rotors import GUESS_FACTOR
-
-# An uncertainty below this factor is told as a standard deviation.
-NEAR = 1.3
-# Two values differ from so many of their common standard deviations: 0.3 %.
-DIFFERENT_STDS = 3.0
+from scara_ident.report.diagnosis_words import sentences
+from scara_ident.report.identification import bias_of
+from scara_ident.report.left_out import left_out_share
 
 
 def diagnosis_dict(diagnosis: Diagnosis, worth: Mapping[str, Any] | None = None) -> dict[str, Any]:
@@ -93,6 +84,7 @@ def diagnosis_dict(diagnosis: Diagnosis, worth: Mapping[str, Any] | None = None)
                 "noise": item.shown,
                 "by": item.by,
                 "why": item.why,
+                "lacks": item.lacks,
                 "detection_limit": None if np.isnan(item.limit) else item.limit,
             }
             for item in diagnosis.evidence
@@ -100,6 +92,10 @@ def diagnosis_dict(diagnosis: Diagnosis, worth: Mapping[str, Any] | None = None)
         "rotors": [_rotor(rotor, diagnosis) for rotor in diagnosis.rotors],
         "training": _before_after(diagnosis, diagnosis.training_before, diagnosis.training_after),
         "validation": _before_after(diagnosis, diagnosis.validation_before, diagnosis.validation_after),
+        "left_out": {
+            "training": left_out_share(diagnosis.training_after),
+            "validation": left_out_share(diagnosis.validation_after),
+        },
         "recordings": {
             kind: {
                 item.name: {
@@ -148,6 +144,17 @@ def best_by_label(decisions: Sequence[Decision]) -> list[Decision]:
         if held is None or decision.gain > held.gain:
             best[decision.label] = decision
     return sorted(best.values(), key=lambda item: -item.gain)
+
+
+def beyond_chance(candidates: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+    """Return the candidates that chance does not explain: one that it does says nothing that others do not.
+
+    Parameters
+    ----------
+    candidates : sequence of mapping
+        Those of ``diagnosis.json``.
+    """
+    return [row for row in candidates if row["p_value"] < 1.0]
 
 
 def _candidate(decision: Decision, diagnosis: Diagnosis) -> dict[str, Any]:
@@ -205,28 +212,6 @@ def _armature_unit(rotor: RotorInertia, diagnosis: Diagnosis) -> str:
     return robot.armature_unit(robot.joints.index(rotor.joint))
 
 
-def _directly(name: str, told: Parameter, fitted: Parameter) -> str:
-    """Say what a channel tells of a parameter by itself, and whether the fit agrees."""
-    same = abs(told.value - fitted.value) <= DIFFERENT_STDS * np.hypot(told.std, fitted.std)
-    agree = "which agrees" if same else "which differs by more than their uncertainty"
-    return f"A channel of its own, without this fit, tells {quantity(name, told)}, {agree}."
-
-
-def _of_rotor(rotor: RotorInertia, diagnosis: Diagnosis) -> str:
-    """Say which inertia of a rotor that nobody stated the result rests on."""
-    unit = _armature_unit(rotor, diagnosis)
-    guess = f"guessed at {rotor.nominal:.2g} {unit} at the joint from the size of its motor"
-    if rotor.told and rotor.factor is not None:
-        near = f"{rotor.armature:.3g} ± {rotor.armature * np.log(rotor.factor):.1g} {unit}"
-        far = f"{rotor.armature:.2g} {unit} within a factor of {rotor.factor:.2g}"
-        found = near if rotor.factor < NEAR else far
-        return f"The rotor inertia of {rotor.joint} is not stated: {guess}, and found to be {found}."
-    return (
-        f"The rotor inertia of {rotor.joint} is not stated and hardly shows: {guess}, which may err by a factor of "
-        f"{GUESS_FACTOR:g}; what depends on it is as unsure as its ± says. State rotor_inertia."
-    )
-
-
 def _unexplained(diagnosis: Diagnosis) -> dict[str, Any] | None:
     remainder = diagnosis.unexplained
     if remainder is None:
@@ -267,117 +252,3 @@ def moved(diagnosis: Diagnosis) -> list[dict[str, Any]]:
                 | {"in_std": change / std}
             )
     return sorted(found, key=lambda item: -abs(item["in_std"]))
-
-
-def quantity(name: str, parameter: Parameter) -> str:
-    """Return a parameter in words, with its standard deviation or that nothing determines it."""
-    unit = "" if parameter.unit == "1" else f" {parameter.unit}"
-    if not np.isfinite(parameter.std):
-        return f"{name} about {parameter.value:.3g}{unit} (not told by recordings)"
-    return f"{name} {parameter.value:.3g} ± {parameter.std:.1g}{unit}"
-
-
-def _curved(diagnosis: Diagnosis, remainder: Unexplained) -> str:
-    """Return the advice to try curved friction where that is what a straight law leaves, else nothing."""
-    laws = [term for term in diagnosis.before.model.terms if isinstance(term, Friction)]
-    straight = all(max(law.powers) < 2 for law in laws)
-    if straight and remainder.signals == (f"velocity of {remainder.joint}",):
-        return ", but the model's friction is straight in speed: try --model complete"
-    return ""
-
-
-def _not_shown(evidence: Sequence[Evidence]) -> list[str]:
-    """Say why what is left was not shown to be noise, joints with the same reason together."""
-    groups: dict[str, list[tuple[str, str]]] = {}
-    for item in evidence:
-        if not item.shown:
-            share, percent, reason = item.why.partition("% ")
-            alike = percent and share.isdigit()
-            groups.setdefault(reason if alike else item.why, []).append((item.joint, share if alike else ""))
-    found = []
-    for why, members in groups.items():
-        shares = sorted({int(share) for _, share in members if share})
-        size = " to ".join(f"{share}%" for share in dict.fromkeys((shares[0], shares[-1]))) + " " if shares else ""
-        found.append(f"On {', '.join(joint for joint, _ in members)}: {size}{why}.")
-    return found
-
-
-def _found(effect: FoundEffect, diagnosis: Diagnosis) -> list[str]:
-    """Say what an effect is and how large, and what the recordings held out show of it."""
-    gain, criteria = effect.held_out, diagnosis.search.step.criteria
-    values = ", ".join(quantity(name, parameter) for name, parameter in effect.parameters.items())
-    unsure = "" if effect.size_told else ", so that it is there is told, but not how large it is"
-    said = f"{effect.title}: {effect.description}; {values}{unsure}"
-    if gain is None:
-        return [f"Found {said}."]
-    if gain.borne_out(criteria):
-        return [f"Found {said}; {shown_of(gain)} on the recordings held out."]
-    words = words_of(gain, diagnosis.robot.torque_unit(diagnosis.robot.joints.index(gain.joint)))
-    if gain.against(criteria):
-        instead = "record further motions to fit"
-        return [f"In doubt: {said}.", f"Not borne out by the recordings held out: {words}; {instead}."]
-    return [f"Found {said}.", f"Not confirmed by the recordings held out: {words}."]
-
-
-def sentences(diagnosis: Diagnosis) -> tuple[str, ...]:
-    """Return the result in words."""
-    found = []
-    if diagnosis.verdict == "complete":
-        found.append("The model lacks nothing that these recordings can show.")
-    if diagnosis.verdict == "undecided":
-        more = "something more is missing than was found" if diagnosis.effects else "something is missing"
-        found.append(f"Undecided: these recordings cannot tell whether {more}.")
-        found += _not_shown(diagnosis.evidence)
-    for effect in diagnosis.effects:
-        found += _found(effect, diagnosis)
-        found += [_directly(name, parameter, effect.parameters[name]) for name, parameter in effect.direct.items()]
-        if effect.confounded_with:
-            others = ", ".join(confounder.label for confounder in effect.confounded_with)
-            found.append(f"These recordings cannot tell it from: {others}.")
-    for guess in diagnosis.tentative:
-        where = f" on {guess.joint}" if guess.joint else ""
-        gain = f"would remove {max(guess.gain, 0.0):.0%} of the squared residual"
-        found.append(
-            f"Worth a look, not added: {guess.effect}{where}, {gain}; {guess.why}; settled by: {guess.settled_by}."
-        )
-    found += [
-        _of_rotor(rotor, diagnosis) for rotor in diagnosis.rotors if not rotor.stated and rotor.factor is not None
-    ]
-    kind, old, new = "held-out", diagnosis.validation_before, diagnosis.validation_after
-    if not old.data.recordings:
-        kind, old, new = "training", diagnosis.training_before, diagnosis.training_after
-    if diagnosis.effects:
-        changes = [
-            f"{joint} {a:.3g} to {b:.3g} {diagnosis.robot.torque_unit(j)}"
-            for j, (joint, a, b) in enumerate(
-                zip(
-                    diagnosis.robot.joints,
-                    rms_of(diagnosis.before.value, old),
-                    rms_of(diagnosis.after.value, new),
-                    strict=True,
-                )
-            )
-            if a is not None and b is not None
-        ]
-        found.append(f"Rms error on the {kind} recordings: {'; '.join(changes)}.")
-    biased = bias_said(diagnosis.after)
-    if biased is not None:
-        found.append(biased)
-    if not diagnosis.fit_after:
-        found.append(
-            "No trajectory was repeated, so the noise floor is not known: record each trajectory twice or more."
-        )
-    remainder = diagnosis.unexplained
-    if remainder is not None:
-        unit = diagnosis.robot.torque_unit(diagnosis.robot.joints.index(remainder.joint))
-        on = f"depends on {' and '.join(remainder.signals)}" if remainder.signals else "repeats from run to run"
-        found.append(
-            f"Unexplained: on {remainder.joint} a remainder of {remainder.rms:.3g} {unit} rms {on}; "
-            f"no effect of the catalogue accounts for it{_curved(diagnosis, remainder)}."
-        )
-    seen = diagnosis.after, diagnosis.training_after
-    found.append(scale_sentence(urdf_scale(*seen), diagnosis.robot, unlike_urdf(*seen)))
-    gravity = gravity_sentence(urdf_gravity(diagnosis.training_before))
-    if gravity is not None:
-        found.append(gravity)
-    return tuple(found)

@@ -9,7 +9,10 @@ import numpy as np
 
 from scara_ident.diagnosis.diagnose import Diagnosis
 from scara_ident.estimation.run_variation import unit_of_kind
-from scara_ident.report.diagnosis import diagnosis_dict
+from scara_ident.manners import several
+from scara_ident.report.diagnosis import beyond_chance, diagnosis_dict
+from scara_ident.report.left_out import left_out_words
+from scara_ident.robot.robot import Robot
 
 
 def diagnosis_markdown(
@@ -41,10 +44,11 @@ def diagnosis_markdown(
                 for joint, before in part.get("before_own_offset", {}).items()
             ]
             lines += _table(f"Error on the {kind} recordings", head, rows)
+    lines += ["", left_out_words(content)]
     if pictures:
         lines += ["", "## Residual before and after"]
         for title, name in pictures:
-            lines += ["", f"### {title[:1].upper()}{title[1:]}", "", f"![{title}]({name})"]
+            lines += ["", f"### {title}", "", f"![{title}]({name})"]
     if content["moved"]:
         rows = [
             (m["name"], _cell(m["urdf"]), f"{m['before']:.4g}", f"{m['after']:.4g}", f"{m['in_std']:+.1f}")
@@ -53,10 +57,10 @@ def diagnosis_markdown(
         head = ("name", "URDF", "before", "after", "in std")
         lines += _table("Parameters that moved when the effects came in", head, rows)
     lines += _certainty(content, diagnosis)
-    rows = [
-        (row["label"], f"{row['gain']:.2%}", f"{row['p_value']:.1e}", row["decision"], row["why"])
-        for row in content["candidates"]
-    ]
+    shown = beyond_chance(content["candidates"])
+    rows = [(row["label"], f"{row['gain']:.2%}", f"{row['p_value']:.1e}", row["decision"], row["why"]) for row in shown]
+    if others := len(content["candidates"]) - len(shown):
+        rows.append((several(others, "other"), "", "", "", "not believed: no better than chance, see diagnosis.json"))
     lines += _table("Candidates", ("candidate", "gain held out", "p", "decision", "why"), rows)
     if content["not_identifiable"]:
         rows = [
@@ -79,8 +83,7 @@ def _certainty(content: Mapping[str, Any], diagnosis: Diagnosis) -> list[str]:
     if content["events"]:
         rows = [
             (
-                row["recording"], f"{row['from']:.2f}", f"{row['to']:.2f}", ", ".join(row["joints"]),
-                f"{row['rms']:.3g}", row["kind"],
+                row["recording"], f"{row['from']:.2f}", f"{row['to']:.2f}", *_sizes(row, diagnosis.robot), row["kind"],
             )
             for row in content["events"]
         ]  # fmt: skip
@@ -108,6 +111,14 @@ def _certainty(content: Mapping[str, Any], diagnosis: Diagnosis) -> list[str]:
         ]
         lines += _table("How runs differ", ("joint", "what", "std between runs", "unit"), rows)
     return lines
+
+
+def _sizes(row: Mapping[str, Any], robot: Robot) -> tuple[str, str]:
+    """Return the joints of an event, the one with the largest torque first, and their torques."""
+    sizes = row.get("rms_by_joint", {row["joints"][0]: row["rms"]})
+    largest = sorted(sizes, key=lambda joint: -sizes[joint])
+    said = (f"{sizes[joint]:.3g} {robot.torque_unit(robot.joints.index(joint))}" for joint in largest)
+    return ", ".join([*largest, *(joint for joint in row["joints"] if joint not in sizes)]), ", ".join(said)
 
 
 def _table(title: str, head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:

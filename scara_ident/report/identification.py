@@ -16,7 +16,7 @@ from scara_ident.estimation.noise_bias import bias_sentence
 from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.saved import estimate_dict
 from scara_ident.estimation.urdf_gravity import gravity_sentence, urdf_gravity
-from scara_ident.estimation.urdf_scale import scale_sentence, unlike_urdf, urdf_scale
+from scara_ident.estimation.urdf_scale import scale_sentence, told_scale, urdf_scale
 from scara_ident.export.result import KEY, rebuild_entry
 from scara_ident.identification.identify import Identification, not_told_from_zero, undetermined, worst_validation
 from scara_ident.manners import listed
@@ -144,12 +144,11 @@ def sentences(identification: Identification) -> tuple[str, ...]:
         found.append(biased)
     if isinstance(identification.estimate, ConsistentEstimate):
         found += _shapes_said(identification.estimate.shapes)
-    seen = identification.estimate, identification.training
     if identification.channels:
         # Under efforts of opposite sign bodies and gravity are nobody's.
         found.append(scale_sentence(None, robot))
         return tuple(found)
-    found.append(scale_sentence(urdf_scale(*seen), robot, unlike_urdf(*seen)))
+    found.append(told_scale(identification.estimate, identification.training))
     gravity = gravity_sentence(urdf_gravity(identification.training))
     if gravity is not None:
         found.append(gravity)

@@ -92,8 +92,11 @@ def _cost_said(item: EffectWorth, rms: Mapping[str, Array]) -> str:
     if item.not_fed is None:
         return f"{said}."
     fed, without = total(rms["effects"], alone), total(item.not_fed, alone)
+    if f"{fed:.0%}" == f"{without:.0%}":
+        # Two equal numbers would read as if it did nothing.
+        return f"{said}."
     harm = ": it does harm, so leave it out of what is fed forward" if _harms(fed, without) else ""
-    return f"{said}; fed forward with all else it leaves {fed:.0%}, and all else without it {without:.0%}{harm}."
+    return f"{said}; with all effects fed forward {fed:.0%} is left, with all but this one {without:.0%}{harm}."
 
 
 def _harms(fed: float, without: float) -> bool:

@@ -114,6 +114,13 @@ def test_a_line_that_leaves_the_band_leaves_little_there(effect: TorqueRipple | 
     assert np.sqrt(np.mean(error**2)) < most * np.sqrt(np.mean(exact**2))
 
 
+def test_one_is_said_in_the_singular():
+    scene = scene_of(load_robot())
+    assert TorqueRipple().description(scene, Member(0, (1.0,))) == "a torque ripple of 1 period per motor turn"
+    assert TorqueRipple().description(scene, Member(0, (2.0,))) == "a torque ripple of 2 periods per motor turn"
+    assert EncoderEccentricity().description(scene, Member(0, (1.0,))) == "an encoder that errs once per motor turn"
+
+
 def test_members_are_those_that_can_be_seen():
     scene = scene_of(load_robot())
     assert Member(0, (2.0,)) in TorqueRipple().members(scene)

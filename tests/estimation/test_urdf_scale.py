@@ -10,7 +10,14 @@ import pytest
 
 from scara_ident.estimation import wls
 from scara_ident.estimation.observations import Observations, observe
-from scara_ident.estimation.urdf_scale import scale_sentence, unlike_urdf, urdf_scale
+from scara_ident.estimation.urdf_scale import (
+    gravity_acts,
+    scale_sentence,
+    slight_joints,
+    told_scale,
+    unlike_urdf,
+    urdf_scale,
+)
 from scara_ident.model.model import build_model
 from scara_ident.motion.prepared import prepare
 from scara_ident.recording.recording import Recording
@@ -71,7 +78,9 @@ def test_a_urdf_that_does_not_show_says_nothing_of_scale(arm):
     rng = np.random.default_rng(2)
     assert scales(robot, replace(run, effort=rng.standard_normal(run.effort.shape)), (1.0, 1.0)) == {}
     assert scale_sentence({}, robot).endswith("the URDF's masses do not show in these torques.")
-    assert scale_sentence(None, robot).endswith("the clock.")
+    assert scale_sentence(None, robot) == (
+        "No recording tells a scale common to all torques and masses: it rests on effort_gain."
+    )
 
 
 def test_what_has_no_finite_variance_says_nothing_of_scale(arm):
@@ -99,3 +108,38 @@ def test_joints_left_out_are_named(arm, tmp_path):
     )
     own = observe(build_model(robot, "basic"), prepare([run], (8.0, 8.0)))
     assert unlike_urdf(wls(own), own) == ()
+
+
+def test_of_time_it_is_said_where_no_joint_feels_gravity(arm):
+    robot, _ = arm
+    upright = load_robot()
+    assert (gravity_acts(robot), gravity_acts(upright)) == (True, False)
+    assert ", nor, without gravity, that of time: they rest on effort_gain" in scale_sentence(None, upright)
+    assert "time" not in scale_sentence(None, robot)
+
+
+def test_nothing_is_asked_for_a_light_joint_whose_centre_of_mass_is_a_little_off(tmp_path):
+    """Four sets of a UR10 were asked whether its gains are right: of a wrist of 0.17 N m, beside 270 on the shoulder."""
+    near = replace(PLANAR_2R[1], mass=0.5, com=(0.001, 0.0, 0.0), inertia=(1e-5, 1e-4, 1e-4))
+    stated = load_robot(write_urdf(tmp_path / "stated.urdf", [PLANAR_2R[0], near]))
+    off = load_robot(write_urdf(tmp_path / "off.urdf", [PLANAR_2R[0], replace(near, com=(0.006, 0.0, 0.0))]))
+    run = noisy(swing(off, seconds=8.0, rate=200.0), np.random.default_rng(1), 0.001)
+    observations = observe(build_model(stated, "basic"), prepare([run], (8.0, 8.0)))
+    seen = wls(observations), observations
+    assert urdf_scale(*seen)["j2"] > 2.0
+    assert slight_joints(*seen) == ("j2",)
+    said = told_scale(*seen)
+    assert "right?" not in said
+    assert said.endswith(
+        " times the URDF's on j2, but so small there that a centre of mass a little off makes as much."
+    )
+    # Of a joint that bears much it is asked, and of all alike.
+    heavy = observe(build_model(stated, "basic"), prepare([replace(run, effort=100.0 * run.effort)], (8.0, 8.0)))
+    assert slight_joints(wls(heavy), heavy) == ()
+    assert "right?" in told_scale(wls(heavy), heavy)
+    alike = scale_sentence({"j1": 100.0, "j2": 110.0}, stated, (), ("j2",))
+    assert alike.endswith("All inertial parameters are 1e+02 of the URDF's: is effort_gain right?")
+    for alone in (-4.0, 4.0):
+        assert f"Torques of the bodies are {alone:g} times the URDF's on j2, but so small there" in scale_sentence(
+            {"j2": alone}, stated, (), ("j2",)
+        )

@@ -51,7 +51,9 @@ def test_a_push_is_found_with_its_times_and_force_and_only_that():
     assert event.force == pytest.approx(FORCE, abs=0.1 * float(np.linalg.norm(FORCE)))
     assert event.begins[0] <= START <= event.begins[1] < event.begins[0] + 0.3
     assert event.ends[0] <= STOP <= event.ends[1] < event.ends[0] + 0.3
-    assert set(event.entry) == {"recording", "from", "from_within", "to", "to_within", "joints", "rms", "kind", "force"}
+    ends = {"from", "from_within", "to", "to_within"}
+    assert set(event.entry) == {"recording", *ends, "joints", "rms", "rms_by_joint", "kind", "force"}
+    assert event.sizes[0] == event.rms
     assert "left out of the fit" in event.sentence(ROBOT)
     other = observed(plain)
     assert find_events(other, robust_fit(other).value) == ()
@@ -123,6 +125,18 @@ def test_a_push_does_not_repeat_what_the_model_lacks_in_a_repetition():
     places = [observations.model.names.index(name) for name in ("a11", "a12")]
     value[places] += -0.12, 0.05
     assert [event.recording for event in find_events(observations, value)] == ["swing0"]
+
+
+def test_each_joint_has_its_own_size_the_largest_first():
+    """`0.597 N m on wrist_1_joint and elbow_joint` was said of 16 N m on the elbow."""
+    one = Event("a", 1.0, 2.0, ("joint1", "joint2"), 0.597, "push", 3.0, sizes=(0.597, 16.0))
+    assert one.sentence(ROBOT).startswith(
+        "a: push from 1.00 to 2.00 s, 16 N m on joint2, 0.597 N m on joint1; left out"
+    )
+    assert one.entry["rms_by_joint"] == {"joint1": 0.597, "joint2": 16.0}
+    known = replace(one, sizes=())
+    assert ", 0.597 N m on joint1 and joint2; left out" in known.sentence(ROBOT)
+    assert "rms_by_joint" not in known.entry
 
 
 def test_of_very_many_events_the_strongest_are_said():

@@ -5,34 +5,32 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
-from scara_ident.diagnosis import diagnose
 from scara_ident.diagnosis.tentative import TentativeEffect
 from scara_ident.estimation.run_variation import JointVariation, RunVariation
+from scara_ident.identification.events import Event
 from scara_ident.report.diagnosis import diagnosis_dict
 from scara_ident.report.diagnosis_markdown import diagnosis_markdown
-from scara_ident.robot.robot import load_robot
-from tests.diagnosis.made import BANDS, exact_runs, with_torque
-from tests.report.test_diagnosis import CATALOGUE, spring
 
 
-@pytest.fixture(scope="module")
-def result():
-    runs = exact_runs(3)
-    held_out = with_torque(runs[4:5], 1, spring)
-    return diagnose(
-        load_robot(), with_torque(runs[:4], 1, spring), validation=held_out, bands=BANDS, catalogue=CATALOGUE
-    )
-
-
-def test_the_story_has_every_candidate_and_both_tables(result):
+def test_the_story_has_both_tables_and_the_candidates_that_chance_does_not_explain(result):
     text = diagnosis_markdown(result)
     assert text.startswith("# Diagnosis of scara03: explained\n")
     assert "## Error on the training recordings" in text
     assert "## Error on the validation recordings" in text
-    for row in diagnosis_dict(result)["candidates"]:
-        assert row["label"] in text
+    assert " % of the time is left out at its rests" in text
+    assert "### joint_elasticity on joint1\n" in diagnosis_markdown(result, [("joint_elasticity on joint1", "one.png")])
+    content = diagnosis_dict(result)
+    sure, by_chance = (
+        {**content["candidates"][0], "label": name, "p_value": p} for name, p in (("x", 0.3), ("y", 1.0))
+    )
+    whole = diagnosis_markdown(result, content={**content, "candidates": [sure, sure]})
+    assert whole.count("| x | ") == 2
+    assert "no better than chance" not in whole
+    folded = diagnosis_markdown(result, content={**content, "candidates": [sure, by_chance, by_chance]})
+    assert "| x | " in folded
+    assert "| y | " not in folded
+    assert "| 2 others |  |  |  | not believed: no better than chance, see diagnosis.json |" in folded
 
 
 def test_what_is_tentative_what_is_noise_and_how_runs_differ_stand_in_the_story(result):
@@ -43,6 +41,8 @@ def test_what_is_tentative_what_is_noise_and_how_runs_differ_stand_in_the_story(
     assert content["run_variation"] == {"joint1": {"friction": 0.06, "delay": 0.003}}
     assert "| stribeck | joint1 | 7.12% | 3.0e-04 | helps in only 1 of 2 | slow motion |" in text
     assert "| joint1 | friction | 0.06 | 1 |\n| joint1 | delay | 0.003 | s |" in text
+    pushed = replace(result, events=(Event("A_1", 1.0, 2.0, ("joint1", "joint2"), 0.6, "push", sizes=(0.6, 16.0)),))
+    assert "| A_1 | 1.00 | 2.00 | joint2, joint1 | 16 N m, 0.6 N m | push |" in diagnosis_markdown(pushed)
     for joint, row in content["evidence"].items():
         shown = "yes" if row["noise"] else "no"
         assert f"| {joint} | {shown} | {row['by'] or '-'} | {row['detection_limit']:.1%} | {row['why']} |" in text

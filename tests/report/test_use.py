@@ -73,11 +73,15 @@ def test_where_an_effect_fed_forward_makes_worse_it_is_said_of_the_joint() -> No
     near = tuple(replace(item, error=item.error / np.abs(item.error) * little.get(item.name, 4.0)) for item in run)
     assert not any("harm" in words for words in sentences(replace(made, runs=(near,))))
     small = EffectWorth({"effect": "spring", "joint": "joint1"}, np.full(2, 2.0), np.full(2, 0.06))
-    assert _cost_said(small, {"pid": np.full(2, 4.0), "effects": np.full(2, 0.076)}).endswith("without it 2%.")
+    assert _cost_said(small, {"pid": np.full(2, 4.0), "effects": np.full(2, 0.076)}).endswith(
+        "spring of joint1: without it the PID alone would leave 50% of its error."
+    )
     found = EffectWorth({"effect": "spring", "joint": "joint1"}, np.full(2, 2.0), np.full(2, 1.0))
     rms = {"pid": np.full(2, 4.0), "effects": np.full(2, 2.0)}
-    assert _cost_said(found, rms).endswith("without it 25%: it does harm, so leave it out of what is fed forward.")
-    assert _cost_said(replace(found, not_fed=np.full(2, 1.9)), rms).endswith("without it 48%.")
+    assert _cost_said(found, rms).endswith(
+        "; with all effects fed forward 50% is left, with all but this one 25%: it does harm, so leave it out of what is fed forward."
+    )
+    assert _cost_said(replace(found, not_fed=np.full(2, 1.9)), rms).endswith("all but this one 48%.")
 
 
 def test_an_effect_in_doubt_is_said_to_be_fed_forward_all_the_same() -> None:

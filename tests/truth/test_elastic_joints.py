@@ -11,7 +11,8 @@ import pytest
 
 from scara_ident.diagnosis.diagnose import Diagnosis, diagnose
 from scara_ident.recording.recording import Recording
-from scara_ident.report.diagnosis import diagnosis_dict, sentences
+from scara_ident.report.diagnosis import diagnosis_dict
+from scara_ident.report.diagnosis_words import sentences
 from scara_ident.robot.robot import load_robot
 from scara_ident.simulation import parse_effect, simulate, virtual_arm
 from tests.effects.scenes import wandering

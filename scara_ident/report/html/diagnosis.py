@@ -169,10 +169,9 @@ def _effect_words(effect: FoundEffect, context: DiagnosisContext) -> list[Block]
         for label, parameter in effect.parameters.items()
     ]
     blocks: list[Block] = [Paragraph(words), Table(("parameter", "value", "std", "unit"), rows, (1, 2))]
-    if not effect.size_told:
-        blocks.append(
-            Paragraph("That it is there is told by what it removes; how large it is these recordings do not tell.")
-        )
+    doubted = effect.held_out is not None and effect.held_out.against(context.diagnosis.search.step.criteria)
+    if not effect.size_told and not doubted:
+        blocks.append(Paragraph("It is there by what it removes, but its size is not settled."))
     if len(found := intervals(effect, context.diagnosis)) > 1:
         blocks += [Paragraph("It acts in these intervals:"), _interval_table(found)]
     if effect.confounded_with:

@@ -10,6 +10,7 @@ import numpy as np
 from scara_ident.estimation.run_variation import KINDS, RunVariation, unit_of_kind
 from scara_ident.identification.events import Event
 from scara_ident.report.html.blocks import Block, Cell, Folded, Paragraph, Table, Tag, chance, name, number
+from scara_ident.report.left_out import left_out_words
 from scara_ident.robot.robot import Robot
 
 RECORDINGS = (("validation", "held out"), ("training", "training"))
@@ -51,7 +52,7 @@ def gain_blocks(content: Mapping[str, Any], robot: Robot) -> list[Block]:
         for j, joint in enumerate(robot.joints)
         for when in times
     ]
-    said = "Rms residual within the band. Held-out recordings took no part in any choice; the noise floor is what does not repeat."
+    said = f"Rms residual within the band. {left_out_words(content)} Held-out recordings took no part in any choice; the noise floor is what does not repeat."
     if any("after_own_offset" in content[kind] for kind, _ in RECORDINGS):
         said += " Offsets of the torques differ from recording to recording: own offsets is what is left beside one of each's own."
     return [
@@ -142,8 +143,7 @@ def evidence_blocks(content: Mapping[str, Any]) -> Sequence[Block]:
     ]
     words = (
         "That nothing was found says little where nothing could have been found. Of the effects tried on a joint, half would "
-        "have had to remove at least the detection limit, a share of its squared residual, to come in. Torques are rms, "
-        "in N m or, of a joint that slides, in N."
+        "have had to remove at least the detection limit, a share of its squared residual, to come in. Torques are rms."
     )
     return [Paragraph(words), Table(("joint", "what is left", "detection limit", "why"), rows, (2,))]
 
@@ -155,8 +155,8 @@ def events_blocks(robot: Robot, events: Sequence[Event]) -> Sequence[Block]:
             name(event.recording),
             f"{event.start:.2f}",
             f"{event.stop:.2f}",
-            ", ".join(event.joints),
-            f"{number(event.rms)} {robot.torque_unit(robot.joints.index(event.joints[0]))}",
+            ", ".join([*(joint for joint, _ in event.sized), *event.joints[len(event.sized) :]]),
+            ", ".join(f"{number(size)} {robot.torque_unit(robot.joints.index(joint))}" for joint, size in event.sized),
             event.kind,
             "–" if event.force is None else f"{np.linalg.norm(event.force):.3g} N",
             "held out" if event.held_out else "left out of the fit",
@@ -165,7 +165,7 @@ def events_blocks(robot: Robot, events: Sequence[Event]) -> Sequence[Block]:
     ]
     words = (
         "Stretches, or whole recordings, that are not explained while others are: no parameter, but something that happened. "
-        "Times are seconds since the recording began; the size is the rms on the first joint, the force what a constant one at "
+        "Times are seconds since the recording began; the size is the rms on each joint, the force what a constant one at "
         "the tool would have to be."
     )
     head = ("recording", "from [s]", "to [s]", "joints", "rms", "kind", "force", "")

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 from scara_ident.diagnosis.diagnose import Diagnosis
 from scara_ident.manners import several
-from scara_ident.report.diagnosis import diagnosis_dict
+from scara_ident.report.diagnosis import beyond_chance, diagnosis_dict
+from scara_ident.report.left_out import left_out_words
 from scara_ident.report.told.words import table, text_of
 
 if TYPE_CHECKING:
@@ -66,10 +67,10 @@ def tables(held: dict[str, Any], *, all_candidates: bool = False) -> list[Table]
         for joint, before in held[kind].get("before_own_offset", {}).items():
             after = held[kind]["after_own_offset"][joint]
             errors.add_row(f"{kind}, own offsets", joint, _number(before), _number(after))
+    errors.caption, errors.caption_justify = left_out_words(held) or None, "left"
     rows = table("candidates", "candidate", "gain", "p", "why", right=("gain", "p"))
     tried = held["candidates"]
-    # One that chance explains says nothing that the others do not.
-    shown = tried if all_candidates else [row for row in tried if row["p_value"] < 1.0][:MOST_CANDIDATES]
+    shown = tried if all_candidates else beyond_chance(tried)[:MOST_CANDIDATES]
     for row in shown:
         rows.add_row(row["label"], f"{row['gain']:.1%}", f"{row['p_value']:.0e}", row["why"])
     others = len(tried) - len(shown)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -38,13 +39,15 @@ def errors(effects: list[Any]) -> dict[str, Any]:
         "training": part,
         "validation": {**part, "before": {}},
         "noise_floor": {"joint1": 0.004},
+        "left_out": {"training": {"joint1": 0.11, "joint2": 0.23}, "validation": {}},
         "recordings": {"training": {"A_1": run}, "validation": {}},
     }
 
 
 @pytest.mark.parametrize("effects", [["spring"], []])
 def test_what_is_left_is_after_over_before_and_without_effects_there_is_one_error(effects):
-    _, table, folded = gain_blocks(errors(effects), ROBOT)
+    said, table, folded = gain_blocks(errors(effects), ROBOT)
+    assert "11 to 23 % of the time is left out" in said.text
     assert isinstance(table, Table)
     first = [cell.text if isinstance(cell, Cell) else cell for cell in table.rows[0]]
     if effects:
@@ -166,6 +169,8 @@ def test_each_event_has_its_row():
     assert shown[0][:4] == ["run_3", "4.20", "5.10", "joint1, joint2"]
     assert shown[0][5:] == ["contact", "5 N", "left out of the fit"]
     assert shown[1][5:] == ["other payload", "–", "held out"]
+    _, table = events_blocks(ROBOT, (replace(PUSH, sizes=(6.1, 7.2)),))
+    assert list(table.rows[0][3:5]) == ["joint2, joint1", "7.20 N m, 6.10 N m"]
 
 
 def test_without_events_nothing_is_shown():

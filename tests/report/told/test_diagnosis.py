@@ -35,7 +35,8 @@ def test_candidates_no_better_than_chance_are_counted_and_not_named():
         {"label": f"effect {k}", "gain": 0.1, "p_value": p, "why": "because"}
         for k, p in enumerate((1e-9, 0.3, 1.0, 1.0))
     ]
-    held = {"training": errors, "validation": errors, "candidates": tried}
+    held = {"training": errors, "validation": errors, "candidates": tried, "left_out": {"training": {"joint1": 0.12}}}
+    assert "12 % of the time is left out" in str(tables(held)[0].caption)
 
     def labels(content: dict, *, everything: bool = False) -> list[str]:
         return list(tables(content, all_candidates=everything)[1].columns[0].cells)

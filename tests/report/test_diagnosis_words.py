@@ -1,0 +1,104 @@
+"""A diagnosis in words."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from scara_ident.diagnosis import diagnose
+from scara_ident.diagnosis.effect_parameters import RotorInertia
+from scara_ident.diagnosis.held_out_gain import HeldOutGain
+from scara_ident.diagnosis.next_steps import next_steps
+from scara_ident.diagnosis.outcome import Unexplained
+from scara_ident.report.diagnosis import diagnosis_dict
+from scara_ident.report.diagnosis_words import sentences
+from scara_ident.robot.robot import load_robot
+from tests.diagnosis.made import BANDS, exact_runs, with_torque
+
+
+def test_words_name_effect_value_and_error(result):
+    said = " ".join(sentences(result))
+    for text in (
+        "Found spring on joint2",
+        "stiffness 0.0",
+        "N m/rad",
+        "Rms error on the held-out recordings",
+        "joint2",
+    ):
+        assert text in said
+    assert "Unexplained" not in said
+
+
+def test_where_it_cannot_be_told_the_first_sentence_says_so(result):
+    unsure = replace(result.evidence[0], shown=False, by="", why="it is not white")
+    undecided = replace(result, verdict="undecided", evidence=(unsure, result.evidence[1]), effects=())
+    first, second, *_ = sentences(undecided)
+    assert first == "Undecided: these recordings cannot tell whether something is missing."
+    assert second == "On joint1: it is not white."
+    both = (
+        replace(unsure, why="76% of it is not white"),
+        replace(unsure, joint="joint2", why="26% of it is not white"),
+    )
+    assert sentences(replace(undecided, evidence=both))[1] == "On joint1, joint2: 26% to 76% of it is not white."
+    assert sentences(replace(undecided, evidence=both[:1]))[1] == "On joint1: 76% of it is not white."
+    lacking = replace(undecided, evidence=(replace(unsure, lacks=True), result.evidence[1]))
+    assert sentences(lacking)[0] == "Undecided: something is missing, on joint1, that these recordings cannot name."
+    assert diagnosis_dict(lacking)["evidence"]["joint1"]["lacks"] is True
+    found, *_ = sentences(replace(undecided, effects=result.effects))
+    assert found == "Undecided: these recordings cannot tell whether something more is missing than was found."
+
+
+def test_a_straight_friction_law_that_leaves_a_curve_is_told_what_to_try():
+    runs = with_torque(exact_runs(), 0, lambda motion: 0.05 * motion.v[0] ** 3)
+    found = diagnose(load_robot(), runs, model="basic", bands=BANDS, catalogue=())
+    words = " ".join(sentences(found))
+    assert found.unexplained is not None
+    assert found.unexplained.signals == (f"velocity of {found.unexplained.joint}",)
+    assert "straight in speed: try --model complete" in words
+    cubic = " ".join(sentences(diagnose(load_robot(), runs, bands=BANDS, catalogue=())))
+    assert "try --model" not in cubic
+
+
+def test_the_rotor_that_a_result_rests_on_is_told_where_nobody_stated_it(result):
+    told = RotorInertia("joint1", 4.1, 1.02, False, 2.4, True)
+    roughly = RotorInertia("joint1", 4.1, 1.5, False, 2.4, True)
+    guessed = RotorInertia("joint2", 2.0, 2.9, False, 2.4, False)
+    stated = RotorInertia("joint2", 4.0, 1.2, True, 4.0, False)
+    by_model = RotorInertia("joint2", 4.0, None, False, 2.4, True)
+    words = sentences(replace(result, rotors=(told, roughly, guessed, stated, by_model)))
+    assert [item for item in words if "rotor" in item] == [
+        "The rotor inertia of joint1 is not stated: guessed at 2.4 kg m^2 at the joint from the size of its motor, and "
+        "found to be 4.1 ± 0.08 kg m^2.",
+        "The rotor inertia of joint1 is not stated: guessed at 2.4 kg m^2 at the joint from the size of its motor, and "
+        "found to be 4.1 kg m^2 within a factor of 1.5.",
+        "The rotor inertia of joint2 is not stated and hardly shows: guessed at 2.4 kg m^2 at the joint from the size of "
+        "its motor, which may err by a factor of 3; what depends on it is as unsure as its ± says. State rotor_inertia.",
+    ]
+    (entry,) = diagnosis_dict(replace(result, rotors=(told,)))["rotors"]
+    assert entry == {
+        "joint": "joint1", "armature": 4.1, "factor": 1.02, "unit": "kg m^2", "nominal": 2.4, "stated": False, "told": True,
+    }  # fmt: skip
+    assert diagnosis_dict(result)["rotors"] == []
+
+
+def test_an_effect_that_is_there_and_whose_size_is_not_told_says_so(result):
+    (effect,) = result.effects
+    assert diagnosis_dict(result)["effects"][0]["size_told"] is True
+    unsure = replace(result, effects=(replace(effect, size_told=False),))
+    said = f"it is there by what it removes (p = {effect.p_value:.1e}), but its size is not settled"
+    assert said in " ".join(sentences(unsure))
+    assert "not settled" not in " ".join(sentences(result))
+    # What those held out speak against is not said to be there.
+    against = HeldOutGain(-0.3, 0.1, 0.05, "joint2", 0.02, 0.03)
+    doubted = " ".join(sentences(replace(result, effects=(replace(effect, size_told=False, held_out=against),))))
+    assert "In doubt: spring on joint2" in doubted
+    assert "not settled" not in doubted
+    assert diagnosis_dict(unsure)["effects"][0]["size_told"] is False
+
+
+def test_where_what_is_left_depends_on_no_signal_it_is_said_what_to_do_first(result):
+    left = replace(result, verdict="unexplained", unexplained=Unexplained("joint1", (), 0.1, 0.0))
+    said = sentences(left)
+    place = next(k for k, words in enumerate(said) if words.endswith("no effect of the catalogue accounts for it."))
+    assert said[place + 1] == f"To do first: {next_steps(left)[0].sentence()}"
+    shown = replace(left, unexplained=Unexplained("joint1", ("position of joint1",), 0.1, 0.5))
+    assert not any(words.startswith("To do first") for words in sentences(shown))
