@@ -112,12 +112,30 @@ def _small(
     small = candidate.effect.negligible(scene, candidate.member, examination.value)
     if small is not None and not candidate.corrects_data:
         return small
-    if gain < criteria.least_gain and (small is not None or not candidate.corrects_data or gain <= 0.0):
-        return (
-            f"below the detection limit: removes {max(gain, 0.0):.1%} of the squared residual, "
-            f"{criteria.least_gain:.0%} is asked"
-        )
-    return None
+    if gain >= criteria.least_gain:
+        return None
+    least = f"below the detection limit: removes {max(gain, 0.0):.1%} of the squared residual, {criteria.least_gain:.0%} is asked"
+    if gain <= 0.0 or not candidate.corrects_data:
+        return least
+    if small is None:
+        return None
+    # Too small to speak of, it may still be more than the parameters' standard deviations say that these are off by.
+    settled = candidate.effect.settled(examination.value)
+    return None if not settled and displacement(examination) > 1.0 else least
+
+
+def displacement(examination: Examination) -> float:
+    """Return the mean square by which parameters are off without a candidate, in the standard deviations that they then have.
+
+    Over as many independent combinations of them as there are parameters. The model takes up all but
+    `Examination.outside` of the squares of a column, and with rows as sure throughout, those inside are to the coefficient's
+    own certainty as inside is to outside. Below 1 what they are off by is within what they are said to be unsure by.
+    """
+    tested, outside = examination.tested, examination.outside
+    if outside <= 0.0 or not np.all(np.isfinite(examination.covariance)):
+        return 0.0
+    squares = float(tested @ np.linalg.pinv(examination.covariance, hermitian=True) @ tested)
+    return squares * (1.0 - outside) / outside / max(1, len(examination.model_value))
 
 
 def _insignificant(examination: Examination, tried: int, criteria: SelectionCriteria) -> str | None:

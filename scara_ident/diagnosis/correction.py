@@ -31,6 +31,10 @@ class Correction:
     candidate: Candidate
     value: Array
 
+    def negligible(self, scene: Scene) -> str | None:
+        """Say why it is too small to be an effect; None where it is not."""
+        return self.candidate.effect.negligible(scene, self.candidate.member, self.value)
+
     def left(self, scene: Scene) -> tuple[Candidate, float] | None:
         """Return what may be left of it and is no part of an arm, and the band, Hz, that holds that; see `Effect.leaves`."""
         found = self.candidate.effect.leaves(scene, self.candidate.member, self.value)

@@ -172,7 +172,7 @@ def uncounted_correction(found: Search, parameters: PhysicalParameters) -> str |
     if found.correction is None:
         return None
     candidate, value = found.correction.candidate, found.correction.value
-    small = candidate.effect.negligible(found.scene, candidate.member, value)
+    small = found.correction.negligible(found.scene)
     if small is not None:
         return small
     own = Coefficients(value, parameters.coefficients[-1].covariance)

@@ -129,7 +129,9 @@ def _recordings(diagnosis: Diagnosis) -> Iterator[NextStep]:
             longest,
         )
     speeds = "the same path at another speed, so that a lag in time is told from what goes with speed"
-    if any(item.decision.candidate.corrects_data for item in diagnosis.search.steps):
+    correction = diagnosis.search.correction
+    # Of what is less than a sample no motion tells more.
+    if correction is not None and correction.negligible(diagnosis.search.scene) is None:
         yield NextStep("the delay that was taken out", speeds, diagnosis.search.scene.duration)
 
 

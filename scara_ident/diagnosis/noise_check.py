@@ -59,8 +59,8 @@ def made_by_noise(step: SelectionStep, decision: Decision) -> str | None:
     p_value = _left_of(found, left).p_value
     if share < criteria.least_without_noise:
         return f"the noise of the positions makes it: with that taken off {share:.0%} of it is left, p = {p_value:.1e}"
-    # Believed as it is, it may pass what is asked by little, so that most of it need not pass.
-    if decision.gain * share < criteria.least_gain:
+    # Believed as it is, it may pass what is asked by little, so that most of it need not pass. Of a correction less is asked.
+    if decision.gain * share < criteria.least_gain <= decision.gain:
         return (
             f"the noise of the positions helps it over the detection limit: with that taken off, {share:.1%} of it is left, which "
             f"removes {decision.gain * share:.2%} of the squared residual, {criteria.least_gain:.0%} is asked"

@@ -60,8 +60,12 @@ def proxies(found: Outcome, criteria: SelectionCriteria) -> list[Decision]:
     search, rest = found.search, _not_repeating(found, left)
     labels = [item.label(search.scene) for item in search.chosen]
     refused = []
+    # What is corrected and not counted is not believed of an arm: put back, it would only be in the parameters again.
+    uncounted = search.correction is not None and search.correction.negligible(search.scene) is not None
     for step, without, beside in _each_without(found, labels):
         decision = step.decision
+        if uncounted and decision.candidate.corrects_data:
+            continue
         owner = decision.candidate.joint(search.scene)
         removal = _removal(
             rest, dict(zip(search.base.robot.joints, zip(without, beside, strict=True), strict=True)), owner

@@ -99,6 +99,8 @@ def test_what_is_mostly_noise_is_not_believed_however_sure_the_rest_is(
             r"surer than it is: .* 99\.\d% of it is left, p = 2\.\de-05 instead of 2\.0e-05; of one of 100 .* 2\.0e-05",
         ),
         (0.9, 1e-9, None),
+        # What was let in below the limit need not be above it.
+        (0.016, 1e-9, None),
     ],
 )
 def test_what_only_just_passes_is_not_believed_for_what_it_fails_by(
