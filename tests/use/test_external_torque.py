@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from scara_ident.effects import EffectTerm
 from scara_ident.effects.catalogue import available_effects
-from scara_ident.effects.effect import EffectTerm
 from scara_ident.effects.parameters import Member
 from scara_ident.effects.signals import Scene
 from scara_ident.errors import UsageError
