@@ -10,10 +10,11 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.effects import Effect, EffectTerm, Member, Scene, Signals
+from scara_ident.effects.links import forget_shared
 from scara_ident.estimation.joint_rows import JointRows
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.motion.motion import Motion
-from scara_ident.motion.position_noise import noisier, unresolved_joints
+from scara_ident.motion.position_noise import forget_noisier, noisier, unresolved_joints
 from scara_ident.motion.prepared import PreparedStretch
 from scara_ident.motion.rest import Bands
 from scara_ident.processes import halved
@@ -191,6 +192,15 @@ class CandidateColumns:
     @cached_property
     def _at_hand(self) -> dict[Motion, tuple[Array, ...]]:
         return columns_at_hand(self.observations)
+
+    def lean(self) -> None:
+        """Forget what is as large as the columns and made again where it is asked for, once a search goes on with others."""
+        self.__dict__.pop("noisier", None)
+        forget_noisier(self.observations.data)
+        self._at.clear()
+        self._signals.clear()
+        for part in self.observations.data.stretches:
+            forget_shared(part.motion)
 
     def forget_all_but(self, *scenes: Scene) -> None:
         """Forget columns that follow other estimates than those of some scenes."""

@@ -54,6 +54,7 @@ def select_model(task: SearchTask, observations: Observations, *, free: bool) ->
         if wider < criteria.wider * _widest(found.data):
             break
         more = CandidateColumns(observe(task.model, data.at((wider,) * len(data.bands))))
+        found.step.columns.lean()
         now, left = next_of(left)
         again = search(replace(task, progress=now), more, known=found)
         told = asked >= criteria.wider * _widest(found.data) and _asked_band(again) > 0.0

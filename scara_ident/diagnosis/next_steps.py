@@ -79,6 +79,8 @@ def next_steps(diagnosis: Diagnosis) -> tuple[NextStep, ...]:
 @one_blas_thread()
 def _steps(diagnosis: Diagnosis) -> tuple[NextStep, ...]:
     found = questions(diagnosis)
+    # Columns are made of what is asked, and what these needed is not held beside.
+    diagnosis.search.step.columns.lean()
     urgent = [item for item in found if item.kind in URGENT]
     asked = [*urgent, *(item for item in found if item not in urgent)]
     sigmas = inquire(diagnosis, asked).sigmas()

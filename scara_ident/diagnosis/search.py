@@ -281,7 +281,7 @@ def _in_intervals(catalogue: Sequence[Effect], state: SearchState) -> list[Candi
     whole = step.columns.predicted(step.scene, step.chosen, value)
     parts = zip(whole, observations.predicted(value[:start]), strict=True)
     left = {
-        replace(motion, torque=motion.torque - (own - base)): held
+        motion.with_torque(motion.torque - (own - base)): held
         for (motion, held), (own, base) in zip(columns_at_hand(observations).items(), parts, strict=True)
         if motion.torque is not None
     }

@@ -91,6 +91,7 @@ class SearchState:
         step = replace(self.step)
         if winner.candidate.corrects_data:
             # The search goes on with other columns.
+            step.columns.lean()
             step = replace(step, columns=step.columns.beside(step.observations))
         return replace(self, step=step)
 

@@ -44,12 +44,21 @@ _SLOPES: WeakKeyDictionary[Motion, dict[int, tuple[Array, tuple[Array, Array, Ar
 
 
 def shared(owner: Signals | Scene | Motion, key: Hashable, make: Callable[[], T]) -> T:
-    """Return what several members of a family need of a stretch of motion, with or without an estimate, or of a scene, made once."""
-    held = _SHARED.setdefault(owner, {})
+    """Return what several members of a family need of a stretch of motion, with or without an estimate, or of a scene, made once.
+
+    What is made of a motion must not follow from its torque: it is that of all motions that differ by it alone.
+    """
+    held = _SHARED.setdefault(owner.kinematics if isinstance(owner, Motion) else owner, {})
     if key not in held:
         held[key] = make()
     found: T = held[key]
     return found
+
+
+def forget_shared(motion: Motion) -> None:
+    """Forget what members share of a motion; it is made again where it is asked for."""
+    _SHARED.pop(motion.kinematics, None)
+    _SLOPES.pop(motion.kinematics, None)
 
 
 def gravity_size(robot: Robot) -> float:
@@ -191,7 +200,7 @@ def rigid_slopes(signals: Signals, joint: int) -> tuple[Array, Array, Array]:
     scene, motion = signals.scene, signals.motion
     if motion.q.dtype == object:
         return _traced_slopes(signals, joint)
-    held = _SLOPES.setdefault(motion, {})
+    held = _SLOPES.setdefault(motion.kinematics, {})
     if joint not in held or held[joint][0] is not scene.value:
         state = (motion.q, motion.v, motion.a)
         steps = (POSITION_STEP, SPEED_STEP * max(float(np.max(np.abs(motion.v))), 1.0))

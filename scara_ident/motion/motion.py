@@ -49,11 +49,24 @@ class Motion(Frozen):
     a: Array
     torque: Array | None
     rate: float
+    # A copy of other positions has no such.
+    _same: Motion | None = field(default=None, init=False, repr=False)
 
     @property
     def samples(self) -> int:
         """Number of samples."""
         return len(self.time)
+
+    @property
+    def kinematics(self) -> Motion:
+        """The first of the motions that differ by their torque alone, by which is kept what follows from the others' state too."""
+        return self if self._same is None else self._same
+
+    def with_torque(self, torque: Array | None) -> Motion:
+        """Return the motion with another recorded torque, shape (n, N)."""
+        found = replace(self, torque=torque)
+        vars(found)["_same"] = self.kinematics
+        return found
 
     def part(self, start: int, stop: int) -> Motion:
         """Return the samples from ``start`` to before ``stop``."""

@@ -75,7 +75,7 @@ class PreparedStretch:
         """Return it with a stretch that differs by its torque alone; what the motion decides is shared."""
         shared = {name: made for name, made in self.__dict__.items() if name != "stretch"}
         found = replace(self, stretch=stretch)
-        found.__dict__.update(shared, motion=replace(self.motion, torque=stretch.torque))
+        found.__dict__.update(shared, motion=self.motion.with_torque(stretch.torque))
         return found
 
     def with_positions_of(self, stretch: Stretch, factor: Array, shift: Array) -> PreparedStretch:

@@ -144,3 +144,18 @@ def test_columns_made_in_two_processes_are_the_same_to_the_last_bit(
         assert one.keys() == other.keys()
         for joint in one:
             assert_array_equal(one[joint], other[joint])
+
+
+def test_what_is_forgotten_to_save_memory_is_made_again_alike():
+    observations = observed(exact_runs()[:2])
+    columns = CandidateColumns(observations)
+    scene = scene_on(observations.model, wls(observations).value, observations)
+    items = [Candidate(effect, member) for effect in (Spring(), BaseTilt()) for member in effect.members(scene)[:2]]
+    before = columns.noisier.rows(scene, items)
+    noisy = columns.noisier
+    columns.lean()
+    assert columns.noisier is not noisy
+    for old, new in zip(before, columns.noisier.rows(scene, items), strict=True):
+        assert old.keys() == new.keys()
+        for joint, rows in old.items():
+            assert_array_equal(rows, new[joint])

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import pickle
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
 from scara_ident.errors import RecordingError
 from scara_ident.motion.low_pass import differentiate
-from scara_ident.motion.motion import Stretch, motion_of, stretches, thinned, torque_of
+from scara_ident.motion.motion import Motion, Stretch, motion_of, stretches, thinned, torque_of
 from scara_ident.recording.recording import Recording
 
 RATE = 1000.0
@@ -143,3 +146,17 @@ def test_motion_is_made_once_and_short_stretches_stay():
     assert thinned(part, 5).position is thinned(part, 5).position
     assert thinned(part, 1) is part
     assert thinned(part, 11) is part
+
+
+def test_motions_that_differ_by_their_torque_alone_share_what_follows_from_their_state():
+    time = np.arange(10) / 100.0
+    q = np.array([np.sin(time)])
+    motion = Motion("m", "m", time, q, q, q, q, 100.0)
+    other = motion.with_torque(2.0 * q)
+    assert other.with_torque(None).kinematics is motion and motion.kinematics is motion
+    assert other.torque is not None and other.torque[0, 3] == 2.0 * q[0, 3]
+    # Positions that are others decide something else.
+    moved = replace(other, q=q + 1.0)
+    assert moved.kinematics is moved
+    sent = pickle.loads(pickle.dumps(other)).kinematics
+    assert sent.torque is not None and sent.torque[0, 3] == q[0, 3]
