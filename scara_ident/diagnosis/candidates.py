@@ -14,7 +14,7 @@ from scara_ident.effects.links import forget_shared
 from scara_ident.estimation.joint_rows import JointRows
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.motion.motion import Motion
-from scara_ident.motion.position_noise import forget_noisier, noisier, unresolved_joints
+from scara_ident.motion.position_noise import noisier, unresolved_joints
 from scara_ident.motion.prepared import PreparedStretch
 from scara_ident.motion.rest import Bands
 from scara_ident.processes import halved
@@ -196,7 +196,6 @@ class CandidateColumns:
     def lean(self) -> None:
         """Forget what is as large as the columns and made again where it is asked for, once a search goes on with others."""
         self.__dict__.pop("noisier", None)
-        forget_noisier(self.observations.data)
         self._at.clear()
         self._signals.clear()
         for part in self.observations.data.stretches:

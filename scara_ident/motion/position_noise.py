@@ -203,11 +203,6 @@ def noisier(data: PreparedData, seed: int = 0) -> PreparedData:
     return drawn[seed]
 
 
-def forget_noisier(data: PreparedData) -> None:
-    """Forget what was drawn for recordings, with all that was prepared of it; the same is drawn again where it is asked for."""
-    _NOISIER.pop(data, None)
-
-
 def _drawn(data: PreparedData, seed: int) -> PreparedData:
     rng = np.random.default_rng(seed)
     recordings = []
