@@ -14,9 +14,9 @@ from scara_ident.effects.links import forget_shared
 from scara_ident.estimation.joint_rows import JointRows
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.motion.motion import Motion
-from scara_ident.motion.position_noise import noisier, unresolved_joints
+from scara_ident.motion.position_noise import forget_noisier, noisier, unresolved_joints
 from scara_ident.motion.prepared import PreparedStretch
-from scara_ident.motion.rest import Bands
+from scara_ident.motion.rest import Bands, position_cuts
 from scara_ident.processes import halved
 from scara_ident.threads import side_by_side
 
@@ -200,6 +200,19 @@ class CandidateColumns:
         self._signals.clear()
         for part in self.observations.data.stretches:
             forget_shared(part.motion)
+
+    def leave(self) -> None:
+        """Forget what only these bands have a use for, once a search goes on in others."""
+        below = {
+            cut
+            for bands in self._at
+            for part in self.observations.data.stretches
+            for cut in position_cuts(part.rate, bands)
+        }
+        self.lean()
+        forget_noisier(self.observations.data)
+        for part in self.observations.data.stretches:
+            part.stretch.forget_filtered(below)
 
     def forget_all_but(self, *scenes: Scene) -> None:
         """Forget columns that follow other estimates than those of some scenes."""

@@ -260,7 +260,7 @@ def diagnose(
     tentative = tentative_effects(found, refused, believed)
     told = believed | {(item.effect, item.joint) for item in tentative}
     # A result is held for longer than what only saved time.
-    found.step.columns.lean()
+    found.step.lean()
     return Diagnosis(
         verdict_of(outcome, effects, shown),
         found,

@@ -54,13 +54,14 @@ def select_model(task: SearchTask, observations: Observations, *, free: bool) ->
         if wider < criteria.wider * _widest(found.data):
             break
         more = CandidateColumns(observe(task.model, data.at((wider,) * len(data.bands))))
-        found.step.columns.lean()
+        found.step.lean()
         now, left = next_of(left)
         again = search(replace(task, progress=now), more, known=found)
         told = asked >= criteria.wider * _widest(found.data) and _asked_band(again) > 0.0
         if promised > explains and not told and not _new(again, found):
             # The motion says less of what is so far up, and there is nothing.
             break
+        found.step.columns.leave()
         found = again
     left("testing what is left")
     return _without_proxies(replace(task, progress=left), outcome_of(task, found))

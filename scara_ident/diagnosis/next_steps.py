@@ -80,7 +80,7 @@ def next_steps(diagnosis: Diagnosis) -> tuple[NextStep, ...]:
 def _steps(diagnosis: Diagnosis) -> tuple[NextStep, ...]:
     found = questions(diagnosis)
     # Columns are made of what is asked, and what these needed is not held beside.
-    diagnosis.search.step.columns.lean()
+    diagnosis.search.step.lean()
     urgent = [item for item in found if item.kind in URGENT]
     asked = [*urgent, *(item for item in found if item not in urgent)]
     sigmas = inquire(diagnosis, asked).sigmas()
@@ -88,7 +88,7 @@ def _steps(diagnosis: Diagnosis) -> tuple[NextStep, ...]:
         NextStep(question.text, ASKED_MOTION, ASKED_SECONDS, float(sigma), question)
         for question, sigma in zip(asked, sigmas, strict=True)
     ]
-    return (
+    steps = (
         *motions[: len(urgent)],
         *_remainder(diagnosis, urgent),
         *_recordings(diagnosis),
@@ -105,6 +105,8 @@ def _steps(diagnosis: Diagnosis) -> tuple[NextStep, ...]:
             for item in diagnosis.aliases
         ),
     )
+    diagnosis.search.step.lean()
+    return steps
 
 
 def _remainder(diagnosis: Diagnosis, asked: Sequence[Question]) -> Iterator[NextStep]:

@@ -89,6 +89,11 @@ class SelectionStep:
         scene = replace(self.scene, columns=columns_at_hand(twin.observations))
         return replace(self, scene=scene, columns=twin, variation=offsets_on(twin.observations, self.offsets))
 
+    def lean(self) -> None:
+        """Forget what only saves time, in the step and in its columns."""
+        self.__dict__.pop("noisier", None)
+        self.columns.lean()
+
     def rows(self, scene: Scene, candidates: Sequence[Candidate]) -> list[Rows]:
         """Return the columns of candidates as they are tried beside the model."""
         found = self.columns.rows(scene, candidates)

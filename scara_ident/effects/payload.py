@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, ClassVar
@@ -106,8 +106,7 @@ class FreePayloadChange(PayloadChange):
 
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
         """Return the torque per standard parameter of the payload from then on."""
-        robot = signals.scene.robot
-        columns = _body(signals)[:, list(self._told(robot))]
+        columns = _body(signals, self._told(signals.scene.robot))
         return np.moveaxis(columns * self.acting(signals, member), 1, 0)
 
     def in_full(self) -> Effect | None:
@@ -197,14 +196,14 @@ class PayloadOfRecordings(Effect):
 
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
         """Return the torque per standard parameter of the payload in recordings of the group, else zero."""
-        robot, names = signals.scene.robot, list(signals.scene.start)
-        shown = list(self._told(robot))
+        names = list(signals.scene.start)
+        shown = self._told(signals.scene.robot)
         name = signals.motion.name
         if name not in names or not member.partner_place >> names.index(name) & 1:
             return np.zeros((len(shown), *signals.motion.q.shape))
         if self.at_tool:
             return [_at_tool(signals)]
-        return np.moveaxis(_body(signals)[:, shown], 1, 0)
+        return np.moveaxis(_body(signals, shown), 1, 0)
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """Say so where the mass is negative, or more than the arm weighs."""
@@ -296,10 +295,13 @@ def _at_tool(signals: Signals) -> Array:
     return shared(signals.motion, "payload", make)
 
 
-def _body(signals: Signals) -> Array:
-    """Return the torque per standard parameter of a body on the last link, shape (n, 10, N)."""
+def _body(signals: Signals, shown: Sequence[int]) -> Array:
+    """Return the torque per standard parameter of a body on the last link, of those shown, shape (n, k, N)."""
     robot = signals.scene.robot
-    return shared(signals.motion, "payload body", lambda: tool_of(robot).columns(robot, signals.motion))
+    # Of a planar arm most of the ten are nothing, and are not held.
+    held = sorted({*shown_of(robot), *shown_of(robot, BODY_COLUMNS, BODY_COLUMN_SHARE)})
+    columns = shared(signals.motion, "payload body", lambda: tool_of(robot).columns(robot, signals.motion)[:, held])
+    return columns[:, [held.index(k) for k in shown]]
 
 
 def _too_heavy(scene: Scene, mass: float, std: float) -> str | None:

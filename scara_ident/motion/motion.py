@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
@@ -119,6 +119,11 @@ class Stretch:
         if (joint, cut) not in self._filtered:
             self.filter_all({joint: cut})
         return self._filtered[joint, cut]
+
+    def forget_filtered(self, cuts: Collection[float | None]) -> None:
+        """Forget what was low-passed at some cut-offs, which nothing asks for any more."""
+        for key in [key for key in self._filtered if key[1] in cuts]:
+            del self._filtered[key]
 
     def filter_all(self, cuts: Mapping[int, float | None]) -> None:
         """Low-pass positions of joints, each at its cut-off in Hz, those of one cut-off together."""
@@ -244,9 +249,12 @@ def motion_of(stretch: Stretch, cuts: Sequence[float | None]) -> Motion:
     Motion
         On the stretch's whole time grid; its ends carry the continuation's guess.
     """
-    stretch.filter_all(dict(enumerate(cuts)))
-    parts = [stretch.filtered(j, cut) for j, cut in zip(range(len(stretch.position)), cuts, strict=True)]
+    wanted = dict(zip(range(len(stretch.position)), cuts, strict=True))
+    stretch.filter_all(wanted)
+    parts = [stretch.filtered(*item) for item in wanted.items()]
     q, v, a = (np.array([part[k] for part in parts]) for k in range(3))
+    # What is held of them is this, once.
+    stretch._filtered.update(zip(wanted.items(), zip(q, v, a, strict=True), strict=True))
     return Motion(stretch.name, stretch.trajectory, stretch.time, q, v, a, stretch.torque, stretch.rate)
 
 

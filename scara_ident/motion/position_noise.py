@@ -203,6 +203,11 @@ def noisier(data: PreparedData, seed: int = 0) -> PreparedData:
     return drawn[seed]
 
 
+def forget_noisier(data: PreparedData) -> None:
+    """Forget what was drawn of recordings in bands that are left."""
+    _NOISIER.pop(data, None)
+
+
 def _drawn(data: PreparedData, seed: int) -> PreparedData:
     rng = np.random.default_rng(seed)
     recordings = []

@@ -20,6 +20,8 @@ from scara_ident.estimation import wls
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.motion import stretches
+from scara_ident.motion.position_noise import noisier
+from scara_ident.motion.rest import position_cuts
 from scara_ident.robot.robot import load_robot
 from tests.diagnosis.made import exact_runs, observed
 from tests.effects.scenes import scene_of
@@ -159,3 +161,17 @@ def test_what_is_forgotten_to_save_memory_is_made_again_alike():
         assert old.keys() == new.keys()
         for joint, rows in old.items():
             assert_array_equal(rows, new[joint])
+
+
+def test_bands_that_are_left_take_what_only_they_needed_with_them():
+    observations = observed(exact_runs()[:2])
+    columns = CandidateColumns(observations)
+    below = columns.at(tuple(0.5 * band for band in observations.data.bands if band is not None))
+    drawn = noisier(observations.data)
+    part = observations.data.stretches[0].stretch
+    cuts = {cut for _, cut in part._filtered}
+    columns.leave()
+    left = {cut for _, cut in part._filtered}
+    assert left < cuts and not left & set(position_cuts(part.rate, below.observations.data.bands))
+    assert set(position_cuts(part.rate, observations.data.bands)) <= left
+    assert noisier(observations.data) is not drawn

@@ -190,3 +190,12 @@ def test_blocks_without_any_row_are_left_out():
     assert all(len(joint.starts) == np.count_nonzero(rows) + 1 for joint in step.model.joints)
     assert [joint.table.shape for joint in step.model.joints] == [joint.table.shape for joint in seen.joints]
     assert_allclose(np.sum(step.model.squares), weighted(seen.by_joint, step.weights).residual_sum(), rtol=1e-9)
+
+
+def test_a_step_that_is_left_forgets_its_twin_with_more_noise():
+    step = step_beside(exact_runs()[:2])
+    twin = step.noisier
+    assert step.noisier is twin
+    step.lean()
+    assert step.noisier is not twin
+    assert_array_equal(step.noisier.model.root, twin.model.root)

@@ -160,3 +160,16 @@ def test_motions_that_differ_by_their_torque_alone_share_what_follows_from_their
     assert moved.kinematics is moved
     sent = pickle.loads(pickle.dumps(other)).kinematics
     assert sent.torque is not None and sent.torque[0, 3] == q[0, 3]
+
+
+def test_what_is_low_passed_is_held_once_and_forgotten_where_nothing_asks_for_it():
+    time = np.arange(400) / RATE
+    part = whole(np.array([sine(1.0, time)[0], sine(2.0, time)[0]]), None)
+    first, second = motion_of(part, [40.0, 40.0]), motion_of(part, [20.0, None])
+    for j in range(2):
+        for row, of_motion in zip(part.filtered(j, 40.0), (first.q, first.v, first.a), strict=True):
+            assert np.shares_memory(row, of_motion)
+    part.forget_filtered({40.0})
+    assert not np.shares_memory(part.filtered(0, 40.0)[0], first.q)
+    assert_allclose(part.filtered(0, 40.0)[0], first.q[0], rtol=0, atol=0)
+    assert np.shares_memory(part.filtered(1, None)[2], second.a)

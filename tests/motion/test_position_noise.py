@@ -14,6 +14,7 @@ from scara_ident.identification.identify import identify
 from scara_ident.motion.position_noise import (
     coarse_positions,
     encoder_step,
+    forget_noisier,
     noise_level,
     noisier,
     unresolved_joints,
@@ -60,6 +61,11 @@ def test_white_noise_is_measured_and_added_once_more(size: float):
     added = more.stretch.position - part.stretch.position
     assert np.std(added, axis=1) == pytest.approx([size, size], rel=0.1)
     assert np.array_equal(more.torque, part.torque)
+    assert noisier(data) is noisier(data)
+    before = noisier(data)
+    forget_noisier(data)
+    assert noisier(data) is not before
+    assert np.array_equal(noisier(data).stretches[0].stretch.position, more.stretch.position)
 
 
 def test_steps_are_added_about_another_zero_and_follow_the_motion():
