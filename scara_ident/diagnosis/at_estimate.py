@@ -19,7 +19,8 @@ def at_estimate(scene: Scene, chosen: Sequence[Candidate], value: Array) -> Scen
     base, found = value[:start], []
     for item in chosen:
         stop = start + len(item.effect.columns(scene, item.member))
-        if item.effect.on_links:
+        # What follows from a load is no part of it.
+        if item.effect.on_links and item.effect.geared_joint(item.member) is None:
             found.append(LinkTorque(item.effect, item.member, tuple(value[start:stop].tolist())))
         start = stop
     return replace(scene, value=base, link_torques=tuple(found))

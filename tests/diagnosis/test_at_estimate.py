@@ -37,6 +37,15 @@ def test_it_knows_the_base_model_and_what_acts_on_links_and_gives_it_back():
     assert_array_equal(estimate_of(scene, CHOSEN), np.concatenate([SCENE.value + 1.0, known]))
 
 
+def test_a_torque_that_follows_from_the_load_is_no_part_of_it():
+    class Swinging(Spring):
+        def geared_joint(self, member):
+            return member.place
+
+    scene = at_estimate(SCENE, (Candidate(Swinging(), Member(0)), SPRING), np.append(SCENE.value, [1.0, 2.0]))
+    assert [(item.effect, item.value) for item in scene.link_torques] == [(SPRING.effect, (2.0,))]
+
+
 def test_an_effect_that_has_just_come_in_is_none_yet():
     scene = at_estimate(SCENE, CHOSEN[:1], VALUE[: len(SCENE.value) + 1])
     assert scene.link_torques == ()
