@@ -148,8 +148,7 @@ class Effect(ABC):
         """Return what coefficients (k,) do to the links of an arm, shape (n, N), on the side of the recorded torque."""
         found = np.zeros_like(signals.motion.q)
         for x, column in zip(value.tolist(), self._named(signals, member), strict=True):
-            rows = self.rows(signals.scene, member)
-            found[rows] = found[rows] + x * (column if np.ndim(column) == 1 else column[rows])
+            found[member.place if np.ndim(column) == 1 else slice(None)] += x * column
         return found
 
     def _named(self, signals: Signals, member: Member) -> list[Array]:

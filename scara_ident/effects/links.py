@@ -234,12 +234,15 @@ def link_slopes(signals: Signals, joint: int) -> tuple[Array, Array, Array]:
     def made() -> tuple[Array, Array, Array]:
         found, motion = [], signals.motion
         state = (motion.q, motion.v, motion.a)
-        for k, step in enumerate((POSITION_STEP, SPEED_STEP * max(float(np.max(np.abs(motion.v))), 1.0), 1.0)):
+        for k, step in enumerate((POSITION_STEP, SPEED_STEP * max(float(np.max(np.abs(motion.v))), 1.0))):
             up, down = [part.copy() for part in state], [part.copy() for part in state]
             up[k][joint] += step
             down[k][joint] -= step
             found.append((on_links_at(signals, *up) - on_links_at(signals, *down)) / (2.0 * step))
-        return rigid[0] + found[0], rigid[1] + found[1], rigid[2] + found[2]
+        pushed = motion.a.copy()
+        pushed[joint] += 1.0
+        by_a = on_links_at(signals, motion.q, motion.v, pushed) - signals.on_links
+        return rigid[0] + found[0], rigid[1] + found[1], rigid[2] + by_a
 
     return shared(signals, ("on links", joint), made)
 

@@ -117,6 +117,8 @@ class Signals:
         """Return the signals at another estimate of the same base model; what does not follow from it is shared."""
         same = scene.value is self.scene.value
         kept = ["time", "sign", "columns", "motor_turns", *(("predicted", "rigid") if same else ())]
+        if same and scene.link_torques is self.scene.link_torques:
+            kept.append("on_links")
         return Signals(scene, self.motion).with_made(**{k: self.__dict__[k] for k in kept if k in self.__dict__})
 
     def with_made(self, **made: Any) -> Signals:
@@ -163,8 +165,8 @@ class Signals:
         """Torque on links of the effects in the model, recorded side, shape (n, N)."""
         found = np.zeros_like(self.motion.q)
         for item in self.scene.link_torques:
-            found = found + item.effect.torque_on_links(self, item.member, np.array(item.value))
-        return np.asarray(found)
+            found += item.effect.torque_on_links(self, item.member, np.array(item.value))
+        return found
 
     def load(self, joint: int) -> Array:
         """Torque that the gear of a joint transmits, recorded side, shape (N,).

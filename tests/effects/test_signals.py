@@ -73,4 +73,6 @@ def test_signals_at_another_estimate_of_what_acts_on_links_have_another_load():
     load = first.load(1)
     other = first.at(replace(scene, link_torques=carrying(scene, 2.0).link_torques))
     assert other.rigid is first.rigid
+    # Another armature leaves it as it is.
+    assert first.at(replace(scene, armatures={0: 1.0})).on_links is first.on_links
     assert other.load(1) == pytest.approx(load + first.on_links[1], abs=1e-9)
