@@ -11,6 +11,7 @@ import numpy as np
 from scara_ident.arrays import Array
 from scara_ident.effects import Effect, EffectTerm, Member, Scene, Signals
 from scara_ident.effects.links import forget_shared
+from scara_ident.effects.signals import LinkTorque
 from scara_ident.estimation.joint_rows import JointRows
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.motion.motion import Motion
@@ -216,7 +217,7 @@ class CandidateColumns:
 
     def forget_all_but(self, *scenes: Scene) -> None:
         """Forget columns that follow other estimates than those of some scenes."""
-        current = {None, *(_estimate(scene) for scene in scenes)}
+        current = {None, *(_estimate(scene, of) for scene in scenes for of in ((), scene.link_torques))}
         for held in (self._rows, self._raw):
             for key in [key for key in held if key[2] not in current]:
                 del held[key]
@@ -228,13 +229,16 @@ def columns_at_hand(observations: Observations) -> dict[Motion, tuple[Array, ...
     return {part.motion: raw for part, raw in zip(observations.data.stretches, raws, strict=True)}
 
 
-def _estimate(scene: Scene) -> Hashable:
-    return scene.value.tobytes(), tuple(sorted(scene.armatures.items()))
+def _estimate(scene: Scene, on_links: tuple[LinkTorque, ...]) -> Hashable:
+    return scene.value.tobytes(), tuple(sorted(scene.armatures.items())), on_links
 
 
 def _key(scene: Scene, candidate: Candidate) -> Key:
-    follows = candidate.effect.follows_estimate
-    return candidate.effect, candidate.member, _estimate(scene) if follows else None
+    effect, member = candidate.effect, candidate.member
+    if not effect.follows_estimate:
+        return effect, member, None
+    loaded = effect.geared_joint(member) is not None
+    return effect, member, _estimate(scene, scene.link_torques if loaded else ())
 
 
 def _on_stretch(

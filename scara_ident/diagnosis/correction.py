@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scara_ident.arrays import Array
+from scara_ident.diagnosis.at_estimate import at_estimate
 from scara_ident.diagnosis.candidate_tests import coefficients
 from scara_ident.diagnosis.candidates import Candidate, CandidateColumns
 from scara_ident.diagnosis.selection_step import SelectionStep, observed
@@ -71,6 +72,5 @@ def taken_out(step: SelectionStep, candidate: Candidate) -> tuple[CandidateColum
         observations = step.observations.with_torque(corrected(step.observations.data, candidate, value))
         step = replace(step, columns=step.columns.beside(observations))
         estimate, weights = value_and_weights(observed(step), step.offsets)
-        scene = replace(step.scene, value=estimate[: len(step.scene.model.columns)])
-        step = replace(step, scene=scene, weights=weights)
+        step = replace(step, scene=at_estimate(step.scene, step.chosen, estimate), weights=weights)
     return step.columns, whole

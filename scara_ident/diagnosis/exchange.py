@@ -107,7 +107,7 @@ def near_in_place(step: SelectionStep, found: Decision, pool: Sequence[Candidate
     least = criteria.near_confounder * found.examination.held_out
 
     def enough(candidates: list[Candidate], columns: Scene, asked: float) -> list[Candidate]:
-        gained = held_out_gains(step.model, step.rows(columns, candidates), criteria)
+        gained = held_out_gains(step.model, step.rows_at_hand(columns, candidates), criteria)
         return [item for item, gain in zip(candidates, gained, strict=True) if gain > asked]
 
     # By the columns at hand first: most come nowhere near, and need no others. But what the effect itself would do on

@@ -12,6 +12,7 @@ from itertools import product
 import numpy as np
 
 from scara_ident.arrays import Array
+from scara_ident.diagnosis.at_estimate import moved_with
 from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, columns_at_hand
 from scara_ident.diagnosis.correction import corrected
 from scara_ident.diagnosis.held_out_intervals import told_by_others, words_of
@@ -85,6 +86,7 @@ def _by_recording(found: Search, value: Array, weights: Array, data: PreparedDat
         shown = f"shows {'; '.join(words) or 'no effect that acts in some recordings only'}"
         notes.append(f"{name}: its first third {shown if name in seen else 'is too short to show which effects act'}")
     rest, useless = with_rows(prepare([rest for _, rest in parted], data.bands), needed=False)
+    scene = moved_with(scene, found.chosen, chosen)
     return HeldOut(rest, scene, tuple(chosen), (*notes, "errors held out are of the other two thirds", *useless))
 
 
@@ -101,7 +103,8 @@ def _in_intervals(found: Search, value: Array, weights: Array, held: HeldOut, ti
                     f"{one.name}: {item.effect.name} acts {words_of(seen)}; each joint is predicted with the intervals that the "
                     "torque of the others tells"
                 )
-    return replace(held, chosen=tuple(chosen), notes=tuple(notes))
+    scene = moved_with(held.scene, held.chosen, chosen)
+    return replace(held, scene=scene, chosen=tuple(chosen), notes=tuple(notes))
 
 
 def _observed(found: Search, data: PreparedData) -> Observations:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
+from scara_ident.diagnosis.at_estimate import moved_with
 from scara_ident.diagnosis.candidates import Candidate, CandidateColumns
 from scara_ident.diagnosis.selection_step import SelectionStep, observed
 from scara_ident.effects import Interval, Scene
@@ -134,7 +135,8 @@ def refined(step: SelectionStep) -> SelectionStep:
         for which, item in enumerate(step.chosen):
             if item.effect.in_intervals:
                 seen = seen_by_joints(step.columns, step.scene, step.chosen, which, value, weights)
-                step = replace(step, chosen=(*step.chosen[:which], _moved(step, item, seen), *step.chosen[which + 1 :]))
+                chosen = (*step.chosen[:which], _moved(step, item, seen), *step.chosen[which + 1 :])
+                step = replace(step, chosen=chosen, scene=moved_with(step.scene, step.chosen, chosen))
     return step
 
 

@@ -201,9 +201,11 @@ def less_noise(step: SelectionStep, decisions: Sequence[Decision], scene: Scene 
 
 def _each_without_noise(step: SelectionStep, decisions: Sequence[Decision], scene: Scene | None = None) -> list[Array]:
     """Return `without_noise` of each, examined beside a model by the columns of a scene."""
-    noisier = step.noisier
-    at = noisier.scene if scene is None else replace(scene, columns=noisier.scene.columns)
-    rows = noisier.rows(at, [item.candidate for item in decisions])
+    noisier, candidates = step.noisier, [item.candidate for item in decisions]
+    if scene is None:
+        rows = noisier.rows(noisier.scene, candidates)
+    else:
+        rows = noisier.rows_at_hand(replace(scene, columns=noisier.scene.columns), candidates)
     return [
         without_noise(item.examination, *coefficients(noisier.model, own, step.criteria))
         for item, own in zip(decisions, rows, strict=True)

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
+from scara_ident.diagnosis.at_estimate import at_estimate, estimate_of, without_others
 from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, Rows, with_columns
 from scara_ident.diagnosis.selection_step import SelectionStep
 from scara_ident.diagnosis.unknowns import Unknown, unknowns_of
@@ -296,7 +297,8 @@ def tune(step: SelectionStep, *, coarse: bool = False) -> SelectionStep:
     """
     if not step.chosen:
         return step
-    size = step.observations.parameters
+    step = replace(step, scene=without_others(step.scene, step.chosen))
+    settling = _settling(step)
     best: Linearised | None = None
     way, share, std = np.zeros(0), 1.0, np.zeros(0)
     tied = any(item.effect.tie(step.scene, item.member) is not None for item in step.chosen)
@@ -311,8 +313,8 @@ def tune(step: SelectionStep, *, coarse: bool = False) -> SelectionStep:
         moved = np.inf
         if best is not None:
             change = share * way[best.linear :]
-            past = np.concatenate([now.value[:size] - best.value[:size], change])
-            spread = np.concatenate([std[:size], std[best.linear :]])
+            past = np.concatenate([(now.value - best.value)[settling], change])
+            spread = np.concatenate([std[settling], std[best.linear :]])
             moved = float(np.max(np.abs(past) / np.maximum(spread, np.finfo(float).tiny)))
         arrived = coarse and best is not None and best.error - now.error < LEAST_FALL * best.error
         best = now
@@ -322,7 +324,19 @@ def tune(step: SelectionStep, *, coarse: bool = False) -> SelectionStep:
         share = min([1.0, *(item.share(x) for item, x in zip(now.unknowns, way[now.linear :], strict=True))])
         step = _moved(step, best, way, share)
     assert best is not None
-    return replace(step, scene=replace(best.scene, value=best.value[:size]), chosen=best.chosen)
+    return replace(step, scene=at_estimate(best.scene, best.chosen, best.value), chosen=best.chosen)
+
+
+def _settling(step: SelectionStep) -> NDArray[np.intp]:
+    """Return the places of the linear parameters that columns follow: of the base model, and of effects that gears transmit."""
+    stop = step.observations.parameters
+    places = [np.arange(stop)]
+    loaded = any(item.effect.geared_joint(item.member) is not None for item in step.chosen)
+    for item in step.chosen:
+        start, stop = stop, stop + len(item.effect.columns(step.scene, item.member))
+        if loaded and item.effect.on_links:
+            places.append(np.arange(start, stop))
+    return np.concatenate(places)
 
 
 def _moved(step: SelectionStep, state: Linearised, way: Array, share: float) -> SelectionStep:
@@ -335,9 +349,9 @@ def _moved(step: SelectionStep, state: Linearised, way: Array, share: float) -> 
             armatures[item.place] = float(np.exp(value))
         else:
             chosen[item.owner] = _moved_candidate(chosen[item.owner], item.place, value)
-    old = state.scene.value
-    bodies = old + share * (way[: len(old)] - old)
-    return replace(step, scene=replace(state.scene, value=bodies, armatures=armatures), chosen=tuple(chosen))
+    old = estimate_of(state.scene, state.chosen)
+    scene = at_estimate(state.scene, chosen, old + share * (way[: len(old)] - old))
+    return replace(step, scene=replace(scene, armatures=armatures), chosen=tuple(chosen))
 
 
 def _moved_candidate(candidate: Candidate, place: int, value: float) -> Candidate:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.acceptance import Decision
+from scara_ident.diagnosis.at_estimate import at_estimate
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.correction import Correction, taken_out
 from scara_ident.diagnosis.interval_fit import refined
@@ -133,7 +134,7 @@ class SearchState:
         step = refined(tune(state.step))
         fitted = observed(step)
         value, weights = value_and_weights(fitted, step.offsets)
-        step = replace(step, scene=replace(step.scene, value=value[: len(step.scene.model.columns)]), weights=weights)
+        step = replace(step, scene=at_estimate(step.scene, step.chosen, value), weights=weights)
         left = rms_of(value, fitted, step.offsets)
         came = Step(winner, step.scene, step.chosen, step.observations.data, value, left)
         repeated = bool(self.steps) and self.steps[-1].decision.label == winner.label

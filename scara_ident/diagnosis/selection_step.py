@@ -101,9 +101,20 @@ class SelectionStep:
             return found
         return [{joint: self.variation.whitened(joint, own) for joint, own in rows.items()} for rows in found]
 
-    def judge(self, candidates: Sequence[Candidate], scene: Scene | None = None) -> list[Decision]:
-        """Examine candidates, by the columns of another scene if one is given, and decide on each."""
-        rows = self.rows(scene or self.scene, candidates)
+    def rows_at_hand(self, first: Scene, candidates: Sequence[Candidate]) -> list[Rows]:
+        """Return the columns that candidates have at another scene, or at this one where the load is another by effects found."""
+        acting = {j for item in self.scene.link_torques for j in item.effect.rows(self.scene, item.member)}
+        loaded = [item.effect.of_load and item.effect.geared_joint(item.member) in acting for item in candidates]
+        found: list[Rows | None] = [None] * len(candidates)
+        for scene, own in ((first, False), (self.scene, True)):
+            places = [k for k, which in enumerate(loaded) if which is own]
+            for k, rows in zip(places, self.rows(scene, [candidates[k] for k in places]), strict=True):
+                found[k] = rows
+        return [rows for rows in found if rows is not None]
+
+    def judge(self, candidates: Sequence[Candidate], first: Scene | None = None) -> list[Decision]:
+        """Examine candidates, by the columns at hand of another scene if one is given, and decide on each."""
+        rows = self.rows(self.scene, candidates) if first is None else self.rows_at_hand(first, candidates)
         found = examine(self.model, rows, self.criteria)
         gained = gains(self.model, rows, [item.member.joint for item in candidates], found)
         for k, (result, gain) in enumerate(zip(found, gained, strict=True)):

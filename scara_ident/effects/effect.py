@@ -60,6 +60,12 @@ class Effect(ABC):
         Whether a joint that does not move in the recordings can show it.
     follows_estimate : bool
         Whether the columns depend on the present estimate, ``scene.value`` or ``scene.armatures``.
+    on_links : bool
+        Whether its torque acts on links, as that of a body or a spring does, and not on motors or in what is measured: the
+        gears then transmit it, and effects that follow `Signals.load` know it.
+    of_load : bool
+        Whether the columns are a function of the load that a gear transmits: with an effect that acts on links they are others,
+        and are made again to be tried beside it.
     fitted_first : bool
         Whether it is judged at the estimate fitted with it only: its columns at the estimate without it are poor ones.
     by_recording, in_intervals : bool
@@ -90,6 +96,8 @@ class Effect(ABC):
     all_joints: ClassVar[bool] = False
     at_rest: ClassVar[bool] = False
     follows_estimate: ClassVar[bool] = False
+    on_links: ClassVar[bool] = False
+    of_load: ClassVar[bool] = False
     fitted_first: ClassVar[bool] = False
     by_recording: ClassVar[bool] = False
     in_intervals: ClassVar[bool] = False
@@ -135,6 +143,13 @@ class Effect(ABC):
         for joint in self.rows(signals.scene, member):
             for k, column in enumerate(columns):
                 rows[joint][k] = column if np.ndim(column) == 1 else column[joint]
+
+    def torque_on_links(self, signals: Signals, member: Member, value: Array) -> Array:
+        """Return what coefficients (k,) do to the links of an arm, shape (n, N), on the side of the recorded torque."""
+        found = np.zeros_like(signals.motion.q)
+        for x, column in zip(value.tolist(), self._named(signals, member), strict=True):
+            found[member.place if np.ndim(column) == 1 else slice(None)] += x * column
+        return found
 
     def _named(self, signals: Signals, member: Member) -> list[Array]:
         """Return the columns of a member, one for each that `columns` describes."""
@@ -277,7 +292,10 @@ class Effect(ABC):
         return member
 
     def geared_joint(self, member: Member) -> int | None:
-        """Return the joint on the torque behind whose gear it depends, and so on the rotor's share of an inertia."""
+        """Return the joint on the torque behind whose gear it depends, and so on the rotor's share of an inertia.
+
+        It then depends on the effects in the model with `on_links` too.
+        """
         return None
 
     def tie(self, scene: Scene, member: Member) -> Tie | None:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,13 +66,24 @@ class EffectTerm:
         """Write the columns into those of each joint: (k, N) where they act, (0, N) where they do not."""
         self.effect.fill(Signals(self.scene, motion), self.member, rows)
 
+    @cached_property
+    def in_state(self) -> EffectTerm:
+        """The term of an arm on whose links nothing acts but what one state tells: no body that it carries at times."""
+        scene = self.scene
+        terms = [EffectTerm(item.effect, item.member, scene) for item in scene.link_torques]
+        kept = [
+            item for item, term in zip(scene.link_torques, terms, strict=True) if follows_state(term.regressor, scene)
+        ]
+        return self if len(kept) == len(terms) else replace(self, scene=replace(scene, link_torques=tuple(kept)))
+
     def state_torque(self, value: Array) -> StateTorque | None:
         """Return the torque of the coefficients (k,) in one state; None where it takes more than the state."""
-        if not follows_state(self.regressor, self.scene):
+        term = self.in_state
+        if not follows_state(term.regressor, term.scene):
             return None
 
         def torque(q: Array, v: Array, a: Array) -> Array:
-            columns = self.regressor(states(q[:, None], v[:, None], a[:, None]))
+            columns = term.regressor(states(q[:, None], v[:, None], a[:, None]))
             return np.asarray(columns[:, :, 0] @ value)
 
         return torque

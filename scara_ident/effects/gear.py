@@ -37,6 +37,7 @@ class TransmissionLoss(Effect):
     nonlinear = (NonlinearParameter("_lost_share", "1", 0.005, LARGEST_LOSS_SHARE),)
     at_rest = True
     follows_estimate = True
+    of_load = True
     of_state = True
     watched = True
     view = View("load", along=True)

@@ -46,6 +46,7 @@ class JointZero(Effect):
     all_joints = True
     at_rest = True
     follows_estimate = True
+    on_links = True
     fitted_first = True
     of_state = True
     view = View("position")

@@ -218,6 +218,35 @@ def rigid_slopes(signals: Signals, joint: int) -> tuple[Array, Array, Array]:
     return held[joint][1]
 
 
+def on_links_at(signals: Signals, q: Array, v: Array, a: Array) -> Array:
+    """Return what `Signals.on_links` gives, at other positions, velocities and accelerations, shape (n, N)."""
+    motion = signals.motion
+    moved = Motion(motion.name, motion.trajectory, motion.time, q, v, a, None, motion.rate)
+    return Signals(signals.scene, moved).on_links
+
+
+def link_slopes(signals: Signals, joint: int) -> tuple[Array, Array, Array]:
+    """Return `rigid_slopes` with those of what effects in the model do to the links, each (n, N)."""
+    rigid = rigid_slopes(signals, joint)
+    if not signals.scene.link_torques:
+        return rigid
+
+    def made() -> tuple[Array, Array, Array]:
+        found, motion = [], signals.motion
+        state = (motion.q, motion.v, motion.a)
+        for k, step in enumerate((POSITION_STEP, SPEED_STEP * max(float(np.max(np.abs(motion.v))), 1.0))):
+            up, down = [part.copy() for part in state], [part.copy() for part in state]
+            up[k][joint] += step
+            down[k][joint] -= step
+            found.append((on_links_at(signals, *up) - on_links_at(signals, *down)) / (2.0 * step))
+        pushed = motion.a.copy()
+        pushed[joint] += 1.0
+        by_a = on_links_at(signals, motion.q, motion.v, pushed) - signals.on_links
+        return rigid[0] + found[0], rigid[1] + found[1], rigid[2] + by_a
+
+    return shared(signals, ("on links", joint), made)
+
+
 def _traced_slopes(signals: Signals, joint: int) -> tuple[Array, Array, Array]:
     """Return the same where signals are recorded expressions, exactly."""
     motion, found = signals.motion, []
@@ -261,7 +290,7 @@ def lagging(signals: Signals, joint: int, lag: tuple[Array, Array, Array]) -> Ar
     ndarray, shape (n, N)
         Recorded side.
     """
-    by_q, by_v, by_a = (slope[:, : len(lag[0])] for slope in rigid_slopes(signals, joint))
+    by_q, by_v, by_a = (slope[:, : len(lag[0])] for slope in link_slopes(signals, joint))
     result = -(by_q * lag[0] + by_v * lag[1] + by_a * lag[2])
     result[joint] = own_lagging(signals, joint, lag)
     return np.asarray(result)
@@ -288,7 +317,7 @@ def lagging_slopes(
     tuple of (ndarray of int, shape (l,), ndarray, shape (l, N))
         The parameters in their order, and their derivatives; of all others they are zero.
     """
-    scene, slopes = signals.scene, rigid_slopes(signals, joint)
+    scene, slopes = signals.scene, link_slopes(signals, joint)
     for j, (moved, recorded) in enumerate(zip(bodies, rigid_rows(signals), strict=True)):
         own = np.flatnonzero(scene.model.rigid_body.pattern[j])
         places, count = np.union1d(own, acting), moved.shape[1]
@@ -305,7 +334,7 @@ def lagging_slopes(
 
 def own_lagging(signals: Signals, joint: int, lag: tuple[Array, Array, Array]) -> Array:
     """Return what `lagging` changes at the lagging joint itself, of one lag (N,) or of several (..., N)."""
-    by_q, by_v, by_a = (slope[joint, : lag[0].shape[-1]] for slope in rigid_slopes(signals, joint))
+    by_q, by_v, by_a = (slope[joint, : lag[0].shape[-1]] for slope in link_slopes(signals, joint))
     rotor = signals.scene.robot.row_scale[joint] * signals.scene.armature(joint)
     return np.asarray(rotor * lag[2] - (by_q * lag[0] + by_v * lag[1] + by_a * lag[2]))
 
@@ -313,7 +342,7 @@ def own_lagging(signals: Signals, joint: int, lag: tuple[Array, Array, Array]) -
 def link_inertia(signals: Signals, joint: int) -> Array:
     """Return the inertia that a joint moves without its rotor, the other joints held, at the joint, shape (N,)."""
     scene = signals.scene
-    by_a = rigid_slopes(signals, joint)[2][joint]
+    by_a = link_slopes(signals, joint)[2][joint]
     return np.asarray(by_a / scene.robot.row_scale[joint] - scene.armature(joint))
 
 

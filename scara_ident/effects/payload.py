@@ -48,6 +48,7 @@ class PayloadChange(Effect):
     summary = "a payload taken up or put down in the run"
     coefficients = (Coefficient("mass", "kg", "mass at the tool from some time in the run on"),)
     nonlinear: ClassVar[tuple[NonlinearParameter, ...]] = (NonlinearParameter("time", "s", 0.0, np.inf, False),)
+    on_links = True
     view = View("time")
     experiment = "repeat the run with the payload fastened, and once without it"
 
@@ -162,6 +163,7 @@ class PayloadOfRecordings(Effect):
 
     name = PayloadChange.name
     summary = "a payload in {recordings}, not in the others"
+    on_links = True
     view = PayloadChange.view
     experiment = PayloadChange.experiment
     by_recording = True
@@ -251,6 +253,7 @@ class GravityCounterbalance(Sinusoid):
         Coefficient("balance_cos", "{torque}", "torque of a counterbalance of {joint} per cosine of its position"),
     )
     amplitude_name = "torque"
+    on_links = True
     of_state = True
     not_simulated = "the virtual arm's springs are straight in the angle"
 

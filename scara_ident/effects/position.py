@@ -31,6 +31,7 @@ class Spring(Effect):
         Coefficient("preload", "{torque}", "torque of the spring on {joint} at position zero"),
     )  # fmt: skip
     at_rest = True
+    on_links = True
     of_state = True
     watched = True
     view = View("position")
@@ -46,6 +47,14 @@ class Spring(Effect):
         j = member.place
         q = signals.scene.robot.drive_sign[j] * signals.motion.q[j]
         return [q, np.ones_like(q)] if offset_of(signals.scene, j) is None else [q]
+
+    def torque_on_links(self, signals: Signals, member: Member, value: Array) -> Array:
+        """Return it with the joint's offset, which is the spring's: see `parameters`."""
+        found, scene = super().torque_on_links(signals, member, value), signals.scene
+        offset = offset_of(scene, member.place)
+        if offset is not None:
+            found[member.place] = found[member.place] + scene.value[offset]
+        return found
 
     def parameters(self, scene: Scene, member: Member, value: Array, covariance: Array) -> Mapping[str, Parameter]:
         """Return stiffness and rest position."""

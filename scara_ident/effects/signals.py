@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,19 @@ from scara_ident.arrays import Array
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.motion import Motion
 from scara_ident.robot.robot import Robot
+
+if TYPE_CHECKING:
+    from scara_ident.effects.effect import Effect
+    from scara_ident.effects.parameters import Member
+
+
+@dataclass(frozen=True)
+class LinkTorque:
+    """An effect in a model whose torque acts on links, with its coefficients, shape (k,), as estimated at present."""
+
+    effect: Effect
+    member: Member
+    value: tuple[float, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +57,8 @@ class Scene:
         what the estimate leaves room for; nominal for the others.
     columns : Mapping[Motion, tuple of ndarray]
         The base model's columns on motions where they are at hand, see `TorqueModel.joint_columns`.
+    link_torques : tuple of LinkTorque
+        Of the effects in the model beside the base model, which gears transmit too.
     """
 
     model: TorqueModel
@@ -56,6 +71,7 @@ class Scene:
     start: dict[str, float]
     armatures: Mapping[int, float] = field(default_factory=dict)
     columns: Mapping[Motion, tuple[Array, ...]] = field(default_factory=dict, repr=False)
+    link_torques: tuple[LinkTorque, ...] = ()
 
     @property
     def robot(self) -> Robot:
@@ -100,7 +116,9 @@ class Signals:
     def at(self, scene: Scene) -> Signals:
         """Return the signals at another estimate of the same base model; what does not follow from it is shared."""
         same = scene.value is self.scene.value
-        kept = ("time", "sign", "columns", "motor_turns", *(("predicted", "rigid") if same else ()))
+        kept = ["time", "sign", "columns", "motor_turns", *(("predicted", "rigid") if same else ())]
+        if same and scene.link_torques is self.scene.link_torques:
+            kept.append("on_links")
         return Signals(scene, self.motion).with_made(**{k: self.__dict__[k] for k in kept if k in self.__dict__})
 
     def with_made(self, **made: Any) -> Signals:
@@ -142,12 +160,23 @@ class Signals:
         active = self.scene.model.active
         return np.array([value[own] @ rows for own, rows in zip(active, self.columns, strict=True)])
 
+    @cached_property
+    def on_links(self) -> Array:
+        """Torque on links of the effects in the model, recorded side, shape (n, N)."""
+        found = np.zeros_like(self.motion.q)
+        for item in self.scene.link_torques:
+            found += item.effect.torque_on_links(self, item.member, np.array(item.value))
+        return found
+
     def load(self, joint: int) -> Array:
-        """Torque that the gear of a joint transmits, recorded side, shape (N,): rigid torque without the own rotor's."""
+        """Torque that the gear of a joint transmits, recorded side, shape (N,).
+
+        It is the rigid torque without that of the own rotor, and what effects in the model do to the links.
+        """
         if joint not in self._loads:
             own = self.scene.robot.row_scale[joint] * self.scene.armature(joint) * self.motion.a[joint]
             left: Array = self.rigid[joint] - own
-            self._loads[joint] = left
+            self._loads[joint] = left + self.on_links[joint] if self.scene.link_torques else left
         return self._loads[joint]
 
     @cached_property

@@ -129,6 +129,7 @@ class _Tilt(Effect):
     name = "base_tilt"
     summary = "a base that is not level"
     follows_estimate = True
+    on_links = True
     of_state = True
     watched = True
     view = View("position")

@@ -26,8 +26,9 @@ from scara_ident.effects.links import (
     held_link_inertia,
     lagging,
     lagging_slopes,
+    link_slopes,
+    on_links_at,
     own_lagging,
-    rigid_slopes,
     rigid_torque,
     usual_link_inertia,
     usual_link_inertia_slopes,
@@ -89,7 +90,7 @@ class TwoMasses:
     def _slopes(self) -> Lag:
         """Derivatives of the torque of the links by position, velocity and acceleration, at the joint, each (N,)."""
         signals, j = self.signals, self.joint
-        by_q, by_v = (slope[j] / signals.scene.robot.row_scale[j] for slope in rigid_slopes(signals, j)[:2])
+        by_q, by_v = (slope[j] / signals.scene.robot.row_scale[j] for slope in link_slopes(signals, j)[:2])
         return by_q, by_v, held_link_inertia(signals, j)
 
     @cached_property
@@ -104,11 +105,12 @@ class TwoMasses:
     @cached_property
     def lag(self) -> Lag:
         """Motor less link, and its first two derivatives, each (N,)."""
-        lag = self.swing.solve(self._load(self.signals.rigid[self.joint], self.signals.motion.a[self.joint]))
+        links = self.signals.rigid[self.joint] + self.signals.on_links[self.joint]
+        lag = self.swing.solve(self._load(links, self.signals.motion.a[self.joint]))
         recorded = self.signals.motion.torque
         if self._initial is not None and recorded is not None:
             signals, j = self.signals, self.joint
-            left = recorded[j] - signals.predicted[j] - own_lagging(signals, j, lag)
+            left = recorded[j] - signals.predicted[j] - signals.on_links[j] - own_lagging(signals, j, lag)
             lag = self._initial.added(lag, self._initial.state(left, (lag[0], lag[1])))
         for _ in range(0 if _small(lag) else STEPS - 1):
             moved = behind(self.signals.motion, self.joint, lag)
@@ -142,6 +144,7 @@ class TwoMasses:
         if _small(self.lag):
             return lagging(self.signals, j, self.lag)
         result = self._torque(behind(self.signals.motion, self.joint, self.lag)) - self.signals.rigid
+        result -= self.signals.on_links
         result[j] += scene.robot.row_scale[j] * scene.armature(j) * self.lag[2]
         return np.asarray(result)
 
@@ -189,7 +192,9 @@ class TwoMasses:
             yield places, rows
 
     def _torque(self, motion: Motion) -> Array:
-        return rigid_torque(self.signals.scene, motion, motion.q, motion.v, motion.a)
+        state = (motion.q, motion.v, motion.a)
+        found = rigid_torque(self.signals.scene, motion, *state)
+        return found + on_links_at(self.signals, *state) if self.signals.scene.link_torques else found
 
     def _load(self, torque: Array, acceleration: Array) -> Array:
         """Return the torque that the gear passes on, at the joint, of that with the rotor on the link."""

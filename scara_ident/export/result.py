@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.effects import EFFECTS, Effect, EffectTerm, Interval, Member, Scene
+from scara_ident.effects.signals import LinkTorque
 from scara_ident.errors import ScaraIdentError
 from scara_ident.estimation import Estimate
 from scara_ident.estimation.consistent.estimator import ConsistentEstimate
@@ -48,7 +49,7 @@ def rebuild_entry(estimate: Estimate, training: Observations, validation: Observ
         "weights": estimate.weights,
         "standard": estimate.standard if isinstance(estimate, ConsistentEstimate) else None,
         "scene": _scene_entry(effects[0].scene) if effects else None,
-        "effects": [_effect_entry(term) for term in effects],
+        "effects": [_effect_entry(term.effect, term.member) for term in effects],
         "observations": {
             kind: [_factor_entry(item, own) for item, own in zip(rows.by_joint, rows.model.active, strict=True)]
             for kind, rows in kinds.items()
@@ -219,20 +220,22 @@ def _robot(entry: Mapping[str, Any], path: Path) -> Robot:
 
 def _scene_entry(scene: Scene) -> dict[str, Any]:
     numbers = {name: getattr(scene, name) for name in ("value", "duration", "rate", "band", "travel", "speed", "start")}
-    return numbers | {"armatures": {str(joint): value for joint, value in scene.armatures.items()}}
+    on_links = [_effect_entry(item.effect, item.member) | {"value": list(item.value)} for item in scene.link_torques]
+    armatures = {str(joint): value for joint, value in scene.armatures.items()}
+    return numbers | {"armatures": armatures, "on_links": on_links}
 
 
-def _effect_entry(term: EffectTerm) -> dict[str, Any]:
-    options = {field.name: getattr(term.effect, field.name) for field in fields(term.effect)}
+def _effect_entry(effect: Effect, member: Member) -> dict[str, Any]:
+    options = {field.name: getattr(effect, field.name) for field in fields(effect)}
     plain = all(isinstance(value, PLAIN) for value in options.values())
     return {
-        "effect": term.name,
-        "family": type(term.effect).__name__,
+        "effect": effect.name,
+        "family": type(effect).__name__,
         "options": {key: sorted(x) if isinstance(x, frozenset) else x for key, x in options.items()} if plain else None,
-        "joint": term.member.joint,
-        "nonlinear": list(term.member.nonlinear),
-        "partner": term.member.partner,
-        "intervals": [list(astuple(item)) for item in term.member.intervals],
+        "joint": member.joint,
+        "nonlinear": list(member.nonlinear),
+        "partner": member.partner,
+        "intervals": [list(astuple(item)) for item in member.intervals],
     }
 
 
@@ -245,6 +248,10 @@ def _with_effects(base: TorqueModel, known: Mapping[str, Any], path: Path) -> To
         *(_array(entry["value"]), entry["duration"], entry["rate"], entry["band"]),
         *(_array(entry["travel"]), _array(entry["speed"]), entry["start"]),
         armatures={int(joint): value for joint, value in entry["armatures"].items()},
+        # Results of earlier versions have none.
+        link_torques=tuple(
+            LinkTorque(_family(item, path), _member(item), tuple(item["value"])) for item in entry.get("on_links", ())
+        ),
     )
     terms = [EffectTerm(_family(item, path), _member(item), scene) for item in known["effects"]]
     return TorqueModel(base.name, base.robot, (*base.terms, *terms))

@@ -75,7 +75,7 @@ def trace_model(model: TorqueModel, value: Array) -> TracedModel:
         if isinstance(term, EffectTerm):
             if not term.effect.of_state:
                 raise ValueError(f"{term.name}: {NOT_OF_STATE}")
-            known = signals.setdefault(id(term.scene), _signals(term.scene, motion))
+            known = signals.setdefault(id(term.scene), _signals(term.in_state.scene, motion))
             rows = _rows(term)
             term.effect.fill(known, term.member, rows)
             rest = rest + _summed(term, rows, part)

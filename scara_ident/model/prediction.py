@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -13,7 +13,7 @@ from scara_ident.errors import UsageError
 from scara_ident.manners import Frozen
 from scara_ident.model.model import TorqueModel
 from scara_ident.model.terms.rigid_body import CHUNK
-from scara_ident.model.terms.term import OfState, StateTorque, Term
+from scara_ident.model.terms.term import InState, OfState, StateTorque, Term
 from scara_ident.motion.motion import Motion
 
 
@@ -76,6 +76,11 @@ class Prediction(Frozen):
         return self._functions[self.model.terms.index(term)] is not None
 
     @cached_property
+    def _in_state(self) -> TorqueModel:
+        terms = tuple(term.in_state if isinstance(term, InState) else term for term in self.model.terms)
+        return replace(self.model, terms=terms)
+
+    @cached_property
     def _functions(self) -> tuple[StateTorque | None, ...]:
         return tuple(_function(term, self.value[self.model.place(term)]) for term in self.model.terms)
 
@@ -94,7 +99,7 @@ class Prediction(Frozen):
         torque = np.empty(q.shape)
         for start in range(0, q.shape[1], CHUNK):
             own = slice(start, start + CHUNK)
-            rows = self.model.joint_columns(states(q[:, own], v[:, own], a[:, own]))
+            rows = self._in_state.joint_columns(states(q[:, own], v[:, own], a[:, own]))
             torque[:, own] = [self._kept[columns] @ row for columns, row in zip(self.model.active, rows, strict=True)]
         return torque
 

@@ -4,7 +4,7 @@ Every joint has one drive coordinate (the motor, seen through the gear) and one 
 unless the joint is elastic. With the torque ``load`` that goes through the gear to the link,
 
     drive  = armature x acceleration + dry x direction + smooth + loss(load, direction) x load
-    load   = (M(q) acceleration + h(q, v) - J(q)^T force from outside) of the link.
+    load   = (M(q) acceleration + h(q, v) + spring - J(q)^T force from outside) of the link.
 
 Where a joint slides its direction is +1 or -1; where it stands still it sticks as long as the friction that holds it
 stays within its bounds, which makes the contact a linear complementarity problem coupled by M.
@@ -138,7 +138,7 @@ def _friction(plant: Plant, room: Room, t: float, x: State, start: Array) -> Non
             dry += plant.signed_sine[j] * np.sin(3.0 * theta[plant.signed_sine_of[j]])
         room.dry[j] = dry
         smooth = warm * (f[1] * w + f[2] * w * speed + f[3] * w * w * w) + plant.constant[j]
-        smooth += plant.asymmetry[j] * speed + plant.spring[j] * (theta[j] - plant.spring_rest[j])
+        smooth += plant.asymmetry[j] * speed
         if plant.swinging_viscous[j] != 0.0:
             smooth += plant.swinging_viscous[j] * w * np.cos(2.0 * theta[plant.swinging_viscous_of[j]])
         room.smooth[j] = smooth
@@ -192,6 +192,7 @@ def accelerate(
     _friction(plant, room, t, x, start)
     lossy = False
     for j in range(n):
+        room.bias[j] += plant.spring[j] * (q[j] - plant.spring_rest[j])
         if plant.elastic[j]:
             room.spring[j] = _spring_torque(plant, j, theta[j] - q[j], omega[j] - v[j])
         elif plant.efficiency[j] < 1.0:

@@ -15,6 +15,7 @@ from scara_ident.effects import CATALOGUE, Member
 from scara_ident.effects.friction import FrictionCoupling, Stribeck
 from scara_ident.effects.gear import TransmissionLoss
 from scara_ident.effects.position import Spring
+from scara_ident.effects.signals import LinkTorque
 from scara_ident.effects.tilt import BaseTilt
 from scara_ident.estimation import wls
 from scara_ident.estimation.observations import Observations, observe
@@ -123,6 +124,31 @@ def test_columns_are_made_once_and_again_only_where_they_follow_the_estimate(mon
     assert len(made) == 8
     # Beside another torque the motion is the same, and so are the columns.
     assert columns.beside(seen).rows(scene, candidates)[0] is first[0]
+
+
+def test_columns_of_a_load_are_made_again_where_what_acts_on_links_is_another(monkeypatch: pytest.MonkeyPatch):
+    seen = observed(exact_runs()[:1])
+    scene = scene_on(seen.model, wls(seen).value, seen)
+    held = replace(scene, link_torques=(LinkTorque(Spring(), Member(1), (0.5,)),))
+    made = []
+    for effect in (BaseTilt, TransmissionLoss):
+        whole = effect.by_joint
+        monkeypatch.setattr(
+            effect, "by_joint", lambda *given, name=effect.name, whole=whole: made.append(name) or whole(*given)
+        )
+    columns = CandidateColumns(seen)
+    candidates = [Candidate(BaseTilt(), Member(None)), Candidate(TransmissionLoss(), Member(1, (0.1,)))]
+    first = columns.rows(scene, candidates)
+    later = columns.rows(held, candidates)
+    again = columns.rows(replace(held, travel=2.0 * held.travel), candidates)
+    assert made == ["base_tilt", "transmission_loss", "transmission_loss"]
+    assert later[0] is first[0] and all(one is same for one, same in zip(later, again, strict=True))
+    assert np.max(np.abs(later[1][1] - first[1][1])) > 0.1 * np.max(np.abs(first[1][1]))
+    columns.forget_all_but(held)
+    assert columns.rows(held, candidates)[1] is later[1] and len(made) == 3
+    columns.forget_all_but(scene)
+    assert columns.rows(held, candidates)[0] is first[0]
+    assert made[3:] == ["transmission_loss"]
 
 
 def test_without_candidates_the_rows_are_those_of_the_model():

@@ -45,6 +45,10 @@ def test_a_payload_is_told_by_the_first_part_and_errors_are_of_the_rest():
     states = held_out_states(result, value, weights, held)
     (now,) = states.chosen
     assert now.effect.description(states.scene, now.member) == "a payload in r_1, r_3, r_10, not in the others"
+    # A gear transmits it in these recordings too.
+    assert [item.member for item in result.scene.link_torques] == [effect.member]
+    assert [item.member for item in states.scene.link_torques] == [now.member]
+    assert states.scene.link_torques[0].value == result.scene.link_torques[0].value
     for part, whole in zip(states.data.recordings, held.recordings, strict=True):
         length = np.ptp(whole.recording.time)
         assert part.recording.time[0] - whole.recording.time[0] == pytest.approx(FIRST_PART * length, abs=0.01)

@@ -14,6 +14,7 @@ from scara_ident.diagnosis.selection_step import SelectionStep
 from scara_ident.effects import Interval, Member
 from scara_ident.effects.payload import PayloadChange
 from scara_ident.effects.payload_intervals import PayloadInIntervals
+from scara_ident.effects.signals import LinkTorque
 from scara_ident.robot.robot import Robot
 from tests.effects.intervals import CYCLES, arms, runs, seen
 
@@ -30,7 +31,11 @@ def test_intervals_that_are_off_are_moved(robots: tuple[Robot, Robot]):
     chosen = (Candidate(PayloadInIntervals(), Member(None, intervals=off)),)
     step = SelectionStep(scene, CandidateColumns(observations), chosen, np.full(2, 20.0), 1, CRITERIA)
     # Two rounds from far away: to a row, which is as long.
-    (found,) = refined(step).chosen
+    held = replace(scene, link_torques=(LinkTorque(chosen[0].effect, chosen[0].member, (1.0,)),))
+    moved = refined(replace(step, scene=held))
+    (found,) = moved.chosen
+    # What acts on links acts then.
+    assert [item.member for item in moved.scene.link_torques] == [found.member]
     for item, (k, start, stop) in zip(found.member.intervals, truth, strict=True):
         assert item.recording == k
         assert item.start == pytest.approx(start, abs=0.05)

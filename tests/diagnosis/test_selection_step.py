@@ -21,6 +21,8 @@ from scara_ident.effects import Member
 from scara_ident.effects.friction import Stribeck
 from scara_ident.effects.gear import TransmissionLoss
 from scara_ident.effects.position import Spring
+from scara_ident.effects.signals import LinkTorque
+from scara_ident.effects.tilt import BaseTilt
 from scara_ident.estimation import wls
 from scara_ident.estimation.information import weighted
 from scara_ident.estimation.observations import observe
@@ -134,6 +136,23 @@ def test_observations_with_effects_are_those_of_the_model_that_has_them(runs: in
     assert_allclose(found.unfiltered_rms(value), wide.unfiltered_rms(value), rtol=1e-9)
     for one, other in zip(found.predicted(value), wide.predicted(value), strict=True):
         assert_allclose(one, other, rtol=0, atol=1e-12)
+
+
+def test_candidates_at_hand_are_at_the_first_scene_but_for_loads_that_are_others_now():
+    step = step_beside(exact_runs(), [Candidate(Spring(), Member(1))])
+    held = LinkTorque(Spring(), Member(1), (0.5,))
+    later = replace(step, scene=replace(step.scene, value=1.1 * step.scene.value, link_torques=(held,)))
+    candidates = [Candidate(TransmissionLoss(), Member(j, (0.1,))) for j in (0, 1)] + [
+        Candidate(BaseTilt(), Member(None))
+    ]
+    found = later.rows_at_hand(step.scene, candidates)
+    first, now = (later.rows(scene, candidates) for scene in (step.scene, later.scene))
+    # The spring loads the second joint alone.
+    assert [own is one for own, one in zip(found, first, strict=True)] == [True, False, True]
+    assert found[1] is now[1]
+    assert all(own is one for own, one in zip(step.rows_at_hand(step.scene, candidates), first, strict=True))
+    (told,) = later.judge(candidates[1:2], step.scene)
+    assert_array_equal(told.examination.value, later.judge(candidates[1:2])[0].examination.value)
 
 
 def test_trajectories_are_the_folds():

@@ -172,3 +172,20 @@ def test_what_is_an_angle_on_a_turning_joint_is_a_length_on_a_sliding_one(effect
             units = [item.unit.format(**words) for item in effect.nonlinear]
             units += [column.unit for column in effect.columns(scene, member)]
             assert not any("rad" in unit for unit in units) or not slides, units
+
+
+@pytest.mark.parametrize(
+    "effect", [item for item in CATALOGUE if item.on_links], ids=lambda effect: type(effect).__name__
+)
+def test_what_acts_on_links_is_the_columns_times_the_coefficients(effect):
+    scene = scene_of_ur5()
+    item = moving(scene.robot, 0.05)
+    for member in members(effect, scene)[:2]:
+        table = effect.regressor(Signals(scene, item), member)
+        value = np.linspace(1.0, 2.0, table.shape[1])
+        found = effect.torque_on_links(Signals(scene, item), member, value)
+        expected = np.einsum("jkn,k->jn", table, value)
+        # A spring says where it rests by the offset of its joint.
+        change = found - expected
+        assert np.allclose(change, change[:, :1], rtol=0.0, atol=1e-9 * np.max(np.abs(expected), initial=1.0))
+        assert effect.geared_joint(member) is None

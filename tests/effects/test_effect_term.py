@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from scara_ident.effects import EffectTerm, Member, Signals
+from scara_ident.effects.gear import TransmissionLoss
 from scara_ident.effects.measurement import TimeDelay
+from scara_ident.effects.payload import PayloadOfRecordings
 from scara_ident.effects.position import Spring
+from scara_ident.effects.signals import LinkTorque
 from scara_ident.errors import ScaraIdentError
 from scara_ident.robot.robot import load_robot
 from tests.effects.scenes import moving, scene_of
@@ -46,3 +51,21 @@ def test_the_torque_in_a_state_is_that_of_its_columns_and_none_where_it_takes_mo
     found = np.array([torque(*(signal[:, k] for signal in (item.q, item.v, item.a))) for k in range(item.samples)]).T
     np.testing.assert_allclose(found, np.einsum("jkt,k->jt", term.regressor(item), [0.05]), rtol=0, atol=1e-15)
     assert EffectTerm(TimeDelay(), TimeDelay().members(scene)[0], scene).state_torque(np.array([0.01])) is None
+
+
+def test_a_loss_in_a_state_is_that_of_what_a_state_tells_and_not_of_what_is_carried_at_times():
+    scene, item = scene_of(load_robot()), moving(load_robot(), 0.02)
+    spring = LinkTorque(Spring(), Member(1), (0.05,))
+    payload = PayloadOfRecordings()
+    group = payload.in_recordings(scene, Member(None), frozenset(["m"]))
+    body = LinkTorque(payload, group, tuple(np.full(len(payload.columns(scene, group)), 0.1).tolist()))
+    loss = EffectTerm(TransmissionLoss(), Member(1, (0.1,)), replace(scene, link_torques=(spring, body)))
+    assert loss.in_state.scene.link_torques == (spring,)
+    assert loss.in_state.in_state is loss.in_state
+    known = EffectTerm(TransmissionLoss(), Member(1, (0.1,)), replace(scene, link_torques=(spring,)))
+    assert known.in_state is known
+    torque = loss.state_torque(np.array([0.1]))
+    assert torque is not None
+    found = np.array([torque(*(signal[:, k] for signal in (item.q, item.v, item.a))) for k in range(item.samples)]).T
+    np.testing.assert_allclose(found, 0.1 * known.regressor(item)[:, 0], rtol=0, atol=1e-15)
+    assert np.max(np.abs(loss.regressor(item) - known.regressor(item))) > 0.0

@@ -11,6 +11,7 @@ from scara_ident.effects import Signals
 from scara_ident.effects.flight import FreeLink, flank
 from scara_ident.robot.robot import load_robot
 from tests.arms import Array
+from tests.effects.carried import carrying, heavier
 from tests.effects.scenes import dense, moving, scene_of
 
 
@@ -79,3 +80,14 @@ def test_slopes_are_the_differences_of_the_torque(joint: int):
             continue
         # Flights end at samples, which a difference moves over one at a time.
         assert np.linalg.norm(found[:, k] - expected) < 0.06 * np.linalg.norm(expected) + 1e-9
+
+
+def test_what_acts_on_links_flies_with_them_as_if_the_bodies_had_it():
+    robot, item = load_robot(), moving(load_robot(), 2.0)
+    carried, merged, empty = (
+        FreeLink(Signals(scene, item), 1, 1e-3).change
+        for scene in (carrying(scene_of(robot), 2.0), heavier(robot, 2.0), scene_of(robot))
+    )
+    size = np.max(np.abs(merged))
+    assert np.max(np.abs(carried - merged)) < 1e-5 * size
+    assert np.max(np.abs(empty - merged)) > 0.1 * size

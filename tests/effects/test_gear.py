@@ -10,11 +10,16 @@ import pytest
 
 from scara_ident.effects import Member
 from scara_ident.effects.gear import TransmissionLoss
+from scara_ident.effects.payload import PayloadChange
+from scara_ident.effects.position import Spring
+from scara_ident.effects.signals import LinkTorque
 from scara_ident.robot.robot import load_robot
 from scara_ident.simulation import effects as fx
+from scara_ident.simulation import simulate
+from tests.effects.carried import ALWAYS
 from tests.effects.scenes import columns, scene_of
 from tests.effects.simulated import ARMS, arm_of, run, true_motion, true_scene
-from tests.simulation.made import left_over
+from tests.simulation.made import left_over, swing
 
 SHARE = 0.2
 
@@ -30,6 +35,34 @@ def test_the_column_times_the_share_is_what_the_simulated_gear_loses(kind: str, 
     assert np.count_nonzero(seen) > 0.9 * seen.size
     assert np.abs(found - lost)[seen].max() < 1e-8 * float(arm.torque_scale[0])
     assert np.abs(found[0]).max() > 1e-2 * float(arm.torque_scale[0])
+
+
+@pytest.mark.parametrize("kind", ARMS)
+@pytest.mark.parametrize(("mass", "stiffness"), [(1.0, 0.0), (0.0, 1.0), (2.5, 0.5)])
+def test_beside_what_acts_on_links_it_is_what_the_simulated_gear_loses_of_all_together(
+    kind: str, mass: float, stiffness: float, tmp_path: Path
+):
+    arm = arm_of(kind, tmp_path)
+    stiffness *= 0.2 * float(arm.torque_scale[0])
+    # The rest position is what the offset says, and here there is none.
+    arm = replace(arm, torque_offset=np.zeros(arm.robot.n))
+    joint = arm.robot.joints[0]
+    acting = [fx.TransmissionLoss(joint, SHARE), fx.Payload(mass=mass) if mass else None]
+    acting.append(fx.Spring(joint, stiffness, 0.0) if stiffness else None)
+    result = simulate(arm, swing(arm.robot, 2.0), effects=[item for item in acting if item is not None])
+    scene, item = true_scene(result), true_motion(result)
+    found = (LinkTorque(PayloadChange(), ALWAYS, (mass,)), LinkTorque(Spring(), Member(0), (stiffness,)))
+    scene = replace(scene, armatures=dict(enumerate(arm.armature.tolist())), link_torques=found)
+    added = columns(PayloadChange(), scene, item, ALWAYS)[:, 0] * mass
+    added = added + columns(Spring(), scene, item, Member(0))[:, 0] * stiffness
+    told = added + SHARE * columns(TransmissionLoss(), scene, item, Member(0, (SHARE,)))[:, 0]
+    left = left_over(arm, result.true)
+    seen = np.isfinite(left) & np.all(result.true.velocity != 0.0, axis=0)
+    assert np.count_nonzero(seen) > 0.9 * seen.size
+    assert np.abs(told - left)[seen].max() < 1e-8 * float(arm.torque_scale[0])
+    alone = replace(scene, link_torques=())
+    missing = SHARE * columns(TransmissionLoss(), alone, item, Member(0, (SHARE,)))[:, 0] + added - left
+    assert np.abs(missing[0])[seen[0]].max() > 1e-3 * float(arm.torque_scale[0])
 
 
 def test_what_no_gear_can_have_is_refused():

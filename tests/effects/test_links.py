@@ -17,8 +17,11 @@ from scara_ident.effects.links import (
     lagging,
     largest_armature,
     link_inertia,
+    link_slopes,
+    on_links_at,
     own_lagging,
     point_mass,
+    rigid_slopes,
     rigid_torque,
     shared,
     sideways,
@@ -28,6 +31,7 @@ from scara_ident.effects.links import (
 from scara_ident.motion.motion import Motion
 from scara_ident.robot.robot import Robot, load_robot
 from tests.arms import example_urdf, rnea
+from tests.effects.carried import carrying, heavier
 from tests.effects.scenes import moving, scene_of
 
 
@@ -149,3 +153,18 @@ def test_the_largest_armature_leaves_the_link_nothing_where_it_is_folded():
 def item_at(q: np.ndarray) -> Motion:
     rest = np.zeros_like(q)
     return Motion("m", "m", np.arange(q.shape[1]) / 100.0, q, rest, rest, None, 100.0)
+
+
+@pytest.mark.parametrize("name", ["scara03", "ur5"])
+def test_what_acts_on_links_lags_with_them_as_if_the_bodies_had_it(name: str):
+    robot = load_robot() if name == "scara03" else load_robot(example_urdf("ur5_robot.urdf"))
+    item, joint = moving(robot, 0.5), 1
+    carried, merged = (Signals(scene, item) for scene in (carrying(scene_of(robot), 1.5), heavier(robot, 1.5)))
+    for found, expected in zip(link_slopes(carried, joint), rigid_slopes(merged, joint), strict=True):
+        # Differences by position err by the torque's rounding over twice the step of 1e-5.
+        assert found == pytest.approx(expected, rel=1e-6, abs=1e-6 * np.max(np.abs(expected)))
+    assert link_slopes(merged, joint) is rigid_slopes(merged, joint)
+    assert link_inertia(carried, joint) == pytest.approx(link_inertia(merged, joint), rel=1e-6)
+    state = item.q + 0.1, item.v, item.a
+    expected = rigid_torque(merged.scene, item, *state) - rigid_torque(carried.scene, item, *state)
+    assert on_links_at(carried, *state) == pytest.approx(expected, abs=1e-9)

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scara_ident.effects import Member, Scene
+from scara_ident.effects import Member, Scene, Signals
 from scara_ident.effects.position import Spring
 from scara_ident.model.model import TorqueModel
 from scara_ident.model.terms.friction import Offset
 from scara_ident.simulation import effects as fx
-from tests.effects.scenes import columns, scene_of
+from tests.effects.scenes import columns, moving, scene_of
 from tests.effects.simulated import ARMS, arm_of, run, true_motion, true_scene
 from tests.simulation.made import left_over, scara
 
@@ -68,3 +68,16 @@ def test_a_spring_does_not_push_away() -> None:
     scene = scene_of(scara().robot)
     assert Spring().inadmissible(scene, Member(0), np.array([-1.0]), np.array([0.1])) is not None
     assert Spring().inadmissible(scene, Member(0), np.array([1.0]), np.array([0.1])) is None
+
+
+def test_a_gear_transmits_a_spring_that_rests_where_the_offset_says() -> None:
+    scene = scene_of(scara().robot)
+    item = moving(scene.robot, 0.2)
+    value, std = np.array([0.05]), np.eye(1)
+    rest = Spring().parameters(scene, Member(1), value, std)["rest_position"].value
+    found = Spring().torque_on_links(Signals(scene, item), Member(1), value)
+    assert found[1] == pytest.approx(0.05 * (item.q[1] - rest))
+    assert np.array_equal(found[0], np.zeros(item.samples))
+    bare = without_offset(scene)
+    both = Spring().torque_on_links(Signals(bare, item), Member(1), np.array([0.05, 0.1]))
+    assert both[1] == pytest.approx(0.05 * item.q[1] + 0.1)

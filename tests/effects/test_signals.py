@@ -9,7 +9,8 @@ import pytest
 
 from scara_ident.effects import Signals
 from scara_ident.robot.robot import load_robot
-from tests.arms import rnea
+from tests.arms import example_urdf, rnea
+from tests.effects.carried import carrying, heavier
 from tests.effects.scenes import moving, scene_of
 
 
@@ -50,3 +51,28 @@ def test_an_armature_is_what_the_model_tells_else_what_an_effect_told_else_nomin
     assert replace(scene, armatures={0: 0.7, 1: 0.7}).armature(0) == 0.7
     assert replace(scene, armatures={0: 0.7, 1: 0.7}).armature(1) == scene.told_armature(1)
     assert scene.told_armature(1) == pytest.approx(nominal[1])
+
+
+@pytest.mark.parametrize(("arm", "mass"), [("scara03", 0.4), ("scara03", 3.0), ("ur5", 1.0), ("ur5", -0.5)])
+def test_a_gear_transmits_what_the_effects_in_the_model_do_to_links_as_if_the_bodies_had_it(arm: str, mass: float):
+    robot = load_robot() if arm == "scara03" else load_robot(example_urdf("ur5_robot.urdf"))
+    item, empty = moving(robot, 0.5), Signals(scene_of(robot), moving(robot, 0.5))
+    carried, merged = Signals(carrying(scene_of(robot), mass), item), Signals(heavier(robot, mass), item)
+    for joint in range(robot.n):
+        assert carried.load(joint) == pytest.approx(merged.load(joint), abs=1e-9)
+    assert np.max(np.abs(carried.load(1) - empty.load(1))) > 1e-3 * np.max(np.abs(empty.load(1)))
+    # The base model says what it said.
+    assert np.array_equal(carried.rigid, empty.rigid)
+    assert np.array_equal(empty.on_links, np.zeros_like(item.q))
+
+
+def test_signals_at_another_estimate_of_what_acts_on_links_have_another_load():
+    robot = load_robot()
+    scene = carrying(scene_of(robot), 1.0)
+    first = Signals(scene, moving(robot, 0.2))
+    load = first.load(1)
+    other = first.at(replace(scene, link_torques=carrying(scene, 2.0).link_torques))
+    assert other.rigid is first.rigid
+    # Another armature leaves it as it is.
+    assert first.at(replace(scene, armatures={0: 1.0})).on_links is first.on_links
+    assert other.load(1) == pytest.approx(load + first.on_links[1], abs=1e-9)

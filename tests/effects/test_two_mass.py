@@ -13,6 +13,7 @@ from scara_ident.effects.two_mass import Swing, TwoMasses
 from scara_ident.motion.motion import Motion
 from scara_ident.robot.robot import load_robot
 from tests.arms import Array
+from tests.effects.carried import carrying, heavier
 from tests.effects.scenes import dense, moving, scene_of
 
 STEP = 2e-3
@@ -148,3 +149,20 @@ def test_the_torque_is_that_of_a_two_mass_arm_by_runge_and_kutta(frequency: floa
     found = TwoMasses(Signals(scene, item), 1, frequency, 0.04).change
     inside = slice(100, -100)
     assert np.abs(found - change)[:, inside].max() < 0.02 * np.abs(change)[:, inside].max()
+
+
+@pytest.mark.parametrize("frequency", [4.0, 40.0])
+def test_what_acts_on_links_swings_with_them_as_if_the_bodies_had_it(frequency: float):
+    robot, item = load_robot(), moving(load_robot(), 2.0)
+    scenes = carrying(scene_of(robot), 2.0), heavier(robot, 2.0), scene_of(robot)
+    usual = [TwoMasses(Signals(scene, item), 1, 1.0, 0.1).inertia for scene in scenes]
+    # The same stiffness and damping: both are told by the usual inertia, which the mass is part of or not.
+    ratios = np.sqrt(usual[0] / np.array(usual))
+    carried, merged, empty = (
+        TwoMasses(Signals(scene, item), 1, frequency * ratio, 0.1 * ratio)
+        for scene, ratio in zip(scenes, ratios, strict=True)
+    )
+    assert merged.stiffness == pytest.approx(carried.stiffness) and merged.damping == pytest.approx(carried.damping)
+    size = np.max(np.abs(merged.change))
+    assert np.max(np.abs(carried.change - merged.change)) < 1e-4 * size
+    assert np.max(np.abs(empty.change - merged.change)) > 0.1 * size

@@ -9,7 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scara_ident.effects import available_effects
+from scara_ident.effects import Member, available_effects
+from scara_ident.effects.payload import PayloadOfRecordings
+from scara_ident.effects.signals import LinkTorque
 from scara_ident.errors import ScaraIdentError
 from scara_ident.estimation import Estimate
 from scara_ident.export.identified_model import IdentifiedModel, identified_model
@@ -110,6 +112,32 @@ def test_every_effect_reads_back_as_it_was(found, content, read):
         value[model.place(term)] = 0.0
     expected = np.einsum("jpn,p->jn", model.regressor(motion), value)
     np.testing.assert_array_equal(model_torque(back, value, motion), expected)
+
+
+def test_what_acts_on_links_reads_back_with_the_load_of_a_gear(found, content, read):
+    base = found.model
+    model = with_effects(base, found.estimate.value, ("spring", "transmission_loss"))
+    payload, group = PayloadOfRecordings(frozenset(["empty"])), Member(None, partner=1)
+    count = len(payload.columns(model.terms[-1].scene, group))
+    body = LinkTorque(payload, group, tuple(np.linspace(0.5, 1.5, count).tolist()))
+    terms = [replace(term, scene=replace(term.scene, link_torques=(body,))) for term in model.terms[len(base.terms) :]]
+    model = replace(model, terms=(*base.terms, *terms))
+    k = len(model.columns)
+    value = np.concatenate([found.estimate.value, np.full(k - len(base.columns), 0.1)])
+    estimate = Estimate(
+        model, "wls", value, np.eye(k), np.zeros(k, dtype=bool), found.estimate.information, found.estimate.weights, ""
+    )
+    parameters = [column.entry(value=x, std=1.0) for column, x in zip(model.columns, value, strict=True)]
+    entry = rebuild_entry(estimate, found.training, found.validation)
+    nothing = [{"samples": 0.0, "rows": 0, "factor": ""}] * 2
+    entry["observations"] = {"training": nothing, "validation": nothing}
+    wider = content | {"parameters": parameters, KEY: entry, "effects": []}
+    back = read(wider)
+    assert [term.scene.link_torques for term in back.model.terms[len(base.terms) :]] == [(body,)] * len(terms)
+    motion = states(model.robot, 0, 5)
+    np.testing.assert_array_equal(back.model.regressor(motion), model.regressor(motion))
+    del wider[KEY]["scene"]["on_links"]
+    assert read(wider).model.terms[-1].scene.link_torques == ()
 
 
 def test_a_diagnosis_without_recordings_held_out_has_the_errors_of_the_training(content, read):

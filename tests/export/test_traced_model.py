@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from scara_ident.effects import available_effects
+from scara_ident.effects import EffectTerm, Member, available_effects
 from scara_ident.effects.effect import Effect
+from scara_ident.effects.payload import PayloadOfRecordings
+from scara_ident.effects.position import Spring
+from scara_ident.effects.signals import LinkTorque
 from scara_ident.export.traced_model import TracedArray, trace_model, traced
+from scara_ident.model.model import TorqueModel
 from scara_ident.model.regressor.tracing import Scalar, Trace, compile_program
 from tests.export.arms import scara, ur5
 from tests.export.identified import identified, model_torque, states
@@ -40,6 +45,32 @@ def test_every_effect_of_the_state_is_recorded_as_it_is(effect: Effect, tmp_path
         # The model differentiates an encoder's error by differences.
         np.testing.assert_allclose(torque, expected, rtol=0, atol=1e-12 * np.max(np.abs(expected)))
     assert tried
+
+
+def test_a_loss_is_recorded_as_that_of_an_arm_that_carries_nothing_and_has_its_spring(tmp_path: Path) -> None:
+    robot = ur5(tmp_path)
+    found = identified(robot, ("transmission_loss", "spring"), samples=60)
+    payload, group = PayloadOfRecordings(frozenset(["empty"])), Member(None, partner=1)
+    scene, motion = found.model.terms[-1].scene, states(robot, 5, 20)
+    body = LinkTorque(payload, group, (2.0,) * len(payload.columns(scene, group)))
+    spring = LinkTorque(Spring(), Member(5), (0.5,))
+    alone, both = (replace(found, model=with_link_torques(found.model, item)) for item in ((spring,), (spring, body)))
+    expected = model_torque(alone, alone.value, motion)
+    model = trace_model(both.model, both.value)
+    np.testing.assert_allclose(
+        evaluated(model, model.torque, motion), expected, rtol=0, atol=1e-12 * np.max(np.abs(expected))
+    )
+    others = (model_torque(other, other.value, motion) for other in (found, both))
+    assert all(np.max(np.abs(other - expected)) > 1e-6 * np.max(np.abs(expected)) for other in others)
+
+
+def with_link_torques(model: TorqueModel, torques: tuple[LinkTorque, ...]) -> TorqueModel:
+    """The model whose gears transmit them."""
+    terms = (
+        replace(term, scene=replace(term.scene, link_torques=torques)) if isinstance(term, EffectTerm) else term
+        for term in model.terms
+    )
+    return replace(model, terms=tuple(terms))
 
 
 def test_mass_bias_and_friction_make_the_torque(models) -> None:

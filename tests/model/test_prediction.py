@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +13,11 @@ import pytest
 from numpy.typing import NDArray
 
 from scara_ident.effects import EffectTerm, Member
+from scara_ident.effects.gear import TransmissionLoss
+from scara_ident.effects.payload import PayloadChange
 from scara_ident.effects.position import Spring
 from scara_ident.effects.presliding import Presliding
+from scara_ident.effects.signals import LinkTorque
 from scara_ident.errors import UsageError
 from scara_ident.model.model import TorqueModel, build_model
 from scara_ident.model.prediction import Prediction, states
@@ -89,3 +93,21 @@ def test_an_effect_of_the_state_is_in_it_and_one_with_a_memory_is_named():
     torque[:, 1] += value[16] * robot.drive_sign[1] * q[:, 1]
     np.testing.assert_allclose(found(q, v, a), torque, rtol=1e-12, atol=1e-10)
     np.testing.assert_allclose(found(q[3], v[3], a[3]), torque[3], rtol=1e-12, atol=1e-10)
+
+
+def test_a_loss_beside_a_body_carried_in_some_recordings_is_predicted_without_it():
+    robot = load_robot()
+    scene, payload, member = scene_of(robot), PayloadChange(), Member(None, (1.0,))
+    body = LinkTorque(payload, member, (2.0,))
+    loaded = replace(scene, link_torques=(body,))
+    terms = [EffectTerm(TransmissionLoss(), Member(1, (0.1,)), loaded), EffectTerm(payload, member, loaded)]
+    wide = TorqueModel("wide", robot, (*scene.model.terms, *terms))
+    predict = Prediction(wide, np.concatenate([scene.value, [0.1, 2.0]]))
+    assert predict.left_out == ("payload_change",)
+    # Seconds apart, most of them later than the body came in the recordings.
+    q, v, a = np.random.default_rng(0).uniform(-1.0, 1.0, (3, 20, robot.n))
+    alone = EffectTerm(TransmissionLoss(), Member(1, (0.1,)), scene)
+    empty = TorqueModel("empty", robot, (*scene.model.terms, alone))
+    expected = Prediction(empty, np.concatenate([scene.value, [0.1]]))(q, v, a)
+    np.testing.assert_allclose(predict(q, v, a), expected, rtol=0, atol=1e-12)
+    np.testing.assert_allclose([predict(*state) for state in zip(q, v, a, strict=True)], expected, rtol=0, atol=1e-12)

@@ -90,6 +90,16 @@ class OfState(Protocol):
         ...
 
 
+@runtime_checkable
+class InState(Protocol):
+    """A term that depends on more than a state, and says what it is without that."""
+
+    @property
+    def in_state(self) -> Term:
+        """The term, with the same columns, as one state tells it."""
+        ...
+
+
 def joint_rows(term: Term, motion: Motion) -> list[Array]:
     """Return of each joint the columns of a term that act on it, shape (k, N) each, in the order of its `pattern`."""
     rows = [np.empty((np.count_nonzero(row), motion.samples)) for row in term.pattern]

@@ -1,4 +1,4 @@
-"""Torques in the drive that depend on position or time alone: ripple, spring, vibration."""
+"""Torques that depend on position or time alone: ripple and vibration of the drive, a spring on the link."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class TorqueRipple(Effect):
 
 @dataclass(frozen=True)
 class Spring(Effect):
-    """A spring across the joint, such as a cable: ``stiffness (q - rest_position)``; not seen by the gear's loss."""
+    """A spring that pulls the link, such as a cable: ``stiffness (q - rest_position)``, which goes through the gear."""
 
     name: ClassVar[str] = "spring"
     units: ClassVar[dict[str, str]] = {"stiffness": "N m/rad", "rest_position": "rad"}

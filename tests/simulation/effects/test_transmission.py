@@ -40,6 +40,18 @@ def test_transmission_loss_takes_power_in_both_directions_of_its_flow() -> None:
     np.testing.assert_allclose(given[driven] / passed[driven], effect.efficiency, rtol=1e-9)
 
 
+def test_a_spring_pulls_the_link_so_that_the_gear_loses_a_share_of_its_torque_too() -> None:
+    frictionless = replace(scara(), friction=np.zeros((2, 4)), rotor_inertia=np.array([0.0014, 0.0]))
+    effects = [fx.TransmissionLoss("joint2", 0.3), fx.Spring("joint2", 0.5, 0.2)]
+    result = simulate(frictionless, swing(frictionless.robot, 3.0), effects=effects)
+    passed = load_at_motor(result)[1] + 0.5 * (result.true.position[1] - 0.2)
+    np.testing.assert_allclose(result.true.load[1] / 100.0, passed, atol=1e-9)
+    moving = result.true.direction[1] != 0.0
+    driving = moving & (passed * result.true.velocity[1] > 1e-3)
+    assert driving.sum() > 300
+    np.testing.assert_allclose(passed[driving] / result.true.effort[1, driving], effects[0].efficiency, rtol=1e-9)
+
+
 def test_a_loaded_gear_with_loss_holds_what_it_could_not_lift() -> None:
     # One vertical link: between load x eta and load / eta the gear stands still.
     robot = load_robot(example_urdf("ur5_robot.urdf"))
