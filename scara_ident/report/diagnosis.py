@@ -44,6 +44,7 @@ def diagnosis_dict(diagnosis: Diagnosis, worth: Mapping[str, Any] | None = None)
         "summary": list(sentences(diagnosis)),
         "band_hz": robot.by_joint(diagnosis.search.bands),
         "band_given": diagnosis.bands_given,
+        "torque_units": robot.torque_units,
         "noise_floor": {fit.joint: fit.noise for fit in diagnosis.fit_after} or dict.fromkeys(robot.joints),
         "lack_of_fit": {
             "before": {fit.joint: fit.missing for fit in diagnosis.fit_before},

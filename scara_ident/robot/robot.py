@@ -145,6 +145,11 @@ class Robot(Frozen):
         """Return the unit of the recorded torque of a joint after ``effort_gain``."""
         return "N" if self.prismatic[joint] and self.effort_side == "joint" else "N m"
 
+    @property
+    def torque_units(self) -> dict[str, str]:
+        """The unit of the recorded torque after ``effort_gain``, by joint."""
+        return self.by_joint([self.torque_unit(joint) for joint in range(self.n)])
+
     def position_unit(self, joint: int) -> str:
         """Return the unit of a joint's position."""
         return "m" if self.prismatic[joint] else "rad"

@@ -8,7 +8,7 @@ from scara_ident.diagnosis.diagnose import Diagnosis
 from scara_ident.manners import several
 from scara_ident.report.diagnosis import beyond_chance, diagnosis_dict
 from scara_ident.report.left_out import left_out_words
-from scara_ident.report.told.words import table, text_of
+from scara_ident.report.told.words import in_units, table, text_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -60,7 +60,8 @@ def tables(held: dict[str, Any], *, all_candidates: bool = False) -> list[Table]
 
     Those that are no better than chance are counted, not named, unless all are wanted.
     """
-    errors = table("rms error within the band", "recordings", "joint", "before", "after", right=("before", "after"))
+    title = f"rms error within the band [{in_units(held['torque_units'])}]"
+    errors = table(title, "recordings", "joint", "before", "after", right=("before", "after"))
     for kind in ("training", "validation"):
         for joint, before in held[kind]["before"].items():
             errors.add_row(kind, joint, _number(before), _number(held[kind]["after"][joint]))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from scara_ident.identification.identify import Identification
 from scara_ident.report.identification import identification_dict, sentences
 from scara_ident.report.told import estimate
-from scara_ident.report.told.words import table, text_of
+from scara_ident.report.told.words import in_units, table, text_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -41,7 +41,8 @@ def figure(identification: Identification) -> Figure:
 def tables(identification: Identification) -> list[Table]:
     """Return the parameters, and the errors on the recordings that were fitted and on those that were not."""
     found = [estimate.parameter_table(identification.estimate)]
-    joints = identification.model.robot.joints
+    robot = identification.model.robot
+    title = f"rms error within the band [{in_units(robot.torque_units)}],"
     for kind, errors in (
         ("fitted", identification.training_errors()),
         ("held out", identification.validation_errors()),
@@ -50,9 +51,9 @@ def tables(identification: Identification) -> list[Table]:
             continue
         own_offsets = any(error and error.rms_own_offset is not None for own in errors.values() for error in own)
         numbers = ("rms", "of torque", "unfiltered", *(["own offset"] if own_offsets else []))
-        rows = table(f"rms error within the band, recordings {kind}", "recording", "joint", *numbers, right=numbers)
+        rows = table(f"{title} {kind}", "recording", "joint", *numbers, right=numbers)
         for name, own in errors.items():
-            for joint, error in zip(joints, own, strict=True):
+            for joint, error in zip(robot.joints, own, strict=True):
                 if error is None:
                     rows.add_row(name, joint, "-", "at rest", *["-"] * (len(numbers) - 2))
                     continue

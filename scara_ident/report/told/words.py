@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Mapping
 from io import StringIO
 from math import floor, log10
 from typing import TYPE_CHECKING
@@ -22,6 +24,12 @@ def table(title: str, *columns: str, right: tuple[str, ...] = ()) -> Table:
     for column in columns:
         result.add_column(column, justify="right" if column in right else "left", overflow="fold")
     return result
+
+
+def in_units(units: Mapping[str, str]) -> str:
+    """Return the unit of most joints, and the others', of units by joint."""
+    usual = Counter(units.values()).most_common(1)[0][0]
+    return "; ".join([usual, *(f"{joint} {unit}" for joint, unit in units.items() if unit != usual)])
 
 
 def number(value: float, std: float | None = None) -> str:
