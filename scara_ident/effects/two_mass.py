@@ -251,7 +251,10 @@ class InitialState:
         normal = self._seen @ self._seen.T
         # What cannot be seen stays as assumed.
         normal += np.diag(UNSEEN * np.trace(normal * sizes) / sizes)
-        return np.asarray(left @ self._seen.T @ np.linalg.inv(normal))
+        told = np.linalg.inv(normal)
+        # Once more on what that leaves: a thousandth would stay as assumed, and the first two samples may assume any speed.
+        once = left @ self._seen.T @ told
+        return np.asarray(once + (left - once @ self._seen) @ self._seen.T @ told)
 
     def added(self, lag: Lag, state: Array) -> Lag:
         """Return x and its derivatives with the swing that a state at the first sample makes."""
