@@ -170,7 +170,7 @@ def test_slopes_are_the_differences_of_the_torque_where_its_first_samples_are_wr
     share = 2.0 / 4.5 * masses.change[1, 50:]
     found = dense(masses.slopes(), len(scene.model.rigid_body.columns) + 3)[1, -2, 50:] - share
     expected = (torque(4.5 + 1e-4) - torque(4.5 - 1e-4)) / 2e-4
-    # What stays of the wrong samples themselves, within the band, is 13 %.
+    # What stays of the wrong samples themselves, within the band, and the size of the lag.
     assert np.abs(found - expected).max() < 0.2 * np.abs(expected).max()
 
 
