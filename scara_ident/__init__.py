@@ -37,11 +37,11 @@ if TYPE_CHECKING:
     from scara_ident.estimation.observations import Observations, observe
     from scara_ident.estimation.recursive import rls
     from scara_ident.estimation.residuals import Residuals
-    from scara_ident.estimation.saved import load_estimate
     from scara_ident.excitation.design import Design, design_excitation
     from scara_ident.excitation.output import write_trajectory
     from scara_ident.excitation.search import Effort
     from scara_ident.export.robots import export_mjcf, export_urdf
+    from scara_ident.export.saved_estimate import load_estimate
     from scara_ident.identification.compare import Comparison, compare
     from scara_ident.identification.identify import Identification, identify
     from scara_ident.model.base_parameters import BaseParameters, check_base_parameters, find_base_parameters
@@ -78,7 +78,6 @@ _NAMES = {
     "estimation.estimate": ("Estimate",),
     "estimation.least_squares": ("ols", "wls"),
     "estimation.residuals": ("Residuals",),
-    "estimation.saved": ("load_estimate",),
     "estimation.recursive": ("rls",),
     "estimation.consistent.estimator": ("ConsistentEstimate", "consistent"),
     "estimation.consistent.options": ("ConsistentOptions",),
@@ -91,6 +90,7 @@ _NAMES = {
     "excitation.output": ("write_trajectory",),
     "excitation.search": ("Effort",),
     "export.robots": ("export_mjcf", "export_urdf"),
+    "export.saved_estimate": ("load_estimate",),
     "simulation.defaults": ("virtual_arm",),
     "simulation.arm": ("VirtualArm",),
     "simulation.effects": ("parse_effect",),

@@ -209,7 +209,10 @@ class SelectionCriteria:
     most_widenings: int = _criterion(2, "times", "bands grow no further")
     # Effects that stand for another.
     least_of_repeatable: float = _criterion(
-        0.5, "of what repeats", "where most of it stays unexplained, an effect that removes less stands for another"
+        0.5,
+        "of what repeats",
+        "where most of it stays unexplained, an effect that removes less stands for another; on recordings held out, of what its "
+        "size promises",
     )
     most_demotions: int = _criterion(3, "rounds", "for time")
     # Effects that cannot be told apart.

@@ -33,8 +33,8 @@ class HeldOutGain:
         What it removes of the weighted squared error, as a share of that and what it leaves on its joint, as
         `FoundEffect.gain`; below zero where the error is larger with it.
     size, std : float
-        How much of the change that it makes to the predicted torque those recordings show, 1 where all of it: below a half the
-        error is larger with it. Infinite std where it changes nothing there.
+        How much of the change that it makes to the predicted torque those recordings show, 1 where all of it: a share s of it
+        removes 2 s - 1 of what all of it would, so that below a half the error is larger with it. Infinite std where it changes nothing there.
     joint : str
         On which it changes most.
     without, rms : float
@@ -61,12 +61,17 @@ class HeldOutGain:
         return HeldOutGain(entry["gain"], entry["size"], std, entry["joint"], entry["without"], entry["with"])
 
     def against(self, criteria: SelectionCriteria = CRITERIA) -> bool:
-        """Whether it makes the error larger, and surely does not show there as large as it was found."""
-        return self.size < 0.5 and 1.0 - self.size > criteria.least_final_size * self.std
+        """Whether it surely does not show there as large as it was found, and removes so little that it stands for another.
+
+        What is less than half of what its size promises is another's doing, as where effects stand for what repeats. That it is
+        surely smaller is not enough: laws are no more than near, and of an effect that is there 99.0 +- 0.3 % may show.
+        """
+        removed = 2.0 * self.size - 1.0
+        return removed < criteria.least_of_repeatable and 1.0 - self.size > criteria.least_final_size * self.std
 
     def borne_out(self, criteria: SelectionCriteria = CRITERIA) -> bool:
-        """Whether it surely shows there, and makes the error smaller."""
-        return self.size > max(0.5, criteria.least_size * self.std)
+        """Whether it surely shows there, and makes the error smaller by what it should."""
+        return self.size > max(0.5, criteria.least_size * self.std) and not self.against(criteria)
 
 
 def held_out_gains(
@@ -115,7 +120,7 @@ def held_out_gains(
 def spoken_against(
     shown: Sequence[Evidence], gains: Mapping[str, HeldOutGain], criteria: SelectionCriteria = CRITERIA
 ) -> tuple[Evidence, ...]:
-    """Take back that a residual is noise on a joint where an effect found makes the recordings held out worse."""
+    """Take back that a residual is noise on a joint where the recordings held out speak against an effect found."""
     why = {
         item.joint: f"{shown_of(item, label)} on the recordings held out"
         for label, item in gains.items()

@@ -106,7 +106,7 @@ class TwoMasses:
     def lag(self) -> Lag:
         """Motor less link, and its first two derivatives, each (N,)."""
         links = self.signals.rigid[self.joint] + self.signals.on_links[self.joint]
-        lag = self.swing.solve(self._load(links, self.signals.motion.a[self.joint]))
+        lag = self._settled(self._load(links, self.signals.motion.a[self.joint]))
         recorded = self.signals.motion.torque
         if self._initial is not None and recorded is not None:
             signals, j = self.signals, self.joint
@@ -118,6 +118,15 @@ class TwoMasses:
             by_q, by_v, by_a = self._slopes
             lag = self.swing.solve(load + by_q * lag[0] + by_v * lag[1] + by_a * lag[2], lag[0][:2])
         return lag
+
+    def _settled(self, torque: Array) -> Lag:
+        """Return the lags under torques (..., N), from rest where the swing at the beginning is looked for.
+
+        Their first samples come from filtered positions of which nobody knows what was before, and may assume any speed.
+        """
+        if self._initial is None:
+            return self.swing.solve(torque)
+        return self.swing.solve(torque, np.repeat(torque[..., :1] / self.swing.stiffness[0], 2, axis=-1))
 
     @cached_property
     def _initial(self) -> InitialState | None:
@@ -170,7 +179,7 @@ class TwoMasses:
         right[np.searchsorted(acting, own)] += bodies[j] / scale
         right[-2] = -4.0 * np.pi * self.inertia * (omega * x + ratio * first)
         right[-1] = -2.0 * omega * self.inertia * first
-        lags = self.swing.solve(right)
+        lags = self._settled(right)
         begun = None
         if self._initial is not None:
             # The swing at the beginning is fitted again whatever the parameters are.
@@ -256,7 +265,10 @@ class InitialState:
         normal = self._seen @ self._seen.T
         # What cannot be seen stays as assumed.
         normal += np.diag(UNSEEN * np.trace(normal * sizes) / sizes)
-        return np.asarray(left @ self._seen.T @ np.linalg.inv(normal))
+        told = np.linalg.inv(normal)
+        # Once more on what that leaves: of what is seen a thousandth would stay as assumed, for as long as it swings.
+        once = left @ self._seen.T @ told
+        return np.asarray(once + (left - once @ self._seen) @ self._seen.T @ told)
 
     def added(self, lag: Lag, state: Array) -> Lag:
         """Return x and its derivatives with the swing that a state at the first sample makes."""

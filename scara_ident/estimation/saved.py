@@ -18,6 +18,8 @@ from scara_ident.memory import read_text
 from scara_ident.model.model import TorqueModel, build_model
 from scara_ident.robot.robot import Robot
 
+GIVE = "give the identification.json or diagnosis.json"
+
 
 def estimate_dict(estimate: Estimate) -> dict[str, Any]:
     """Return all of an estimate but how runs differ, which its covariance holds; the robot and the model by name."""
@@ -47,47 +49,24 @@ def estimate_dict(estimate: Estimate) -> dict[str, Any]:
     return found
 
 
-def load_estimate(path: Path | str, robot: Robot) -> Estimate:
-    """Load the estimate of an ``identification.json``: parameters, covariance and triangular factor.
-
-    Predictions, standard deviations and information are those of the estimate that was saved, bit by bit. Recordings
-    are not in the file.
-
-    Parameters
-    ----------
-    path : path
-        What `Identification.save` or the command ``identify`` wrote.
-    robot : Robot
-        The same robot; its model is built anew.
-
-    Returns
-    -------
-    Estimate
-        A `ConsistentEstimate` where it was one.
+def read_estimate(path: Path, robot: Robot) -> Estimate | None:
+    """Return the estimate that a file holds as `estimate_dict` has it, bit by bit; None where it holds a model in another way.
 
     Raises
     ------
     UsageError
         If the file cannot be read, holds no estimate, or is of another robot or model.
-
-    Examples
-    --------
-    >>> from scara_ident import identify, load_estimate, load_robot, named_motion, simulate, virtual_arm
-    >>> robot = load_robot()
-    >>> run = simulate(virtual_arm(robot), named_motion("OJK", robot), rate=250.0)
-    >>> result = identify(robot, [run.recording], model="basic")
-    >>> result.save("identification.json")
-    >>> load_estimate("identification.json", robot)
-    Estimate(scara03, basic by wls: 11 parameters)
     """
-    path = Path(path)
     try:
-        held = json.loads(read_text(path))["estimate"]
+        content = json.loads(read_text(path))
+        if "estimate" not in content and "rebuild" in content:
+            return None
+        held = content["estimate"]
         name, joints, names = held["model"], tuple(held["joints"]), tuple(held["names"])
     except OSError as error:
-        raise UsageError(f"{path}: cannot be read: {error.strerror or error}; give an identification.json") from None
+        raise UsageError(f"{path}: cannot be read: {error.strerror or error}; {GIVE}") from None
     except (ValueError, KeyError, TypeError, RecursionError):
-        raise UsageError(f"{path}: no estimate in it; give the identification.json that identify wrote") from None
+        raise UsageError(f"{path}: no estimate in it; {GIVE} that identify or diagnose wrote") from None
     model = build_model(robot, name)
     if joints != robot.joints or names != model.names:
         raise UsageError(

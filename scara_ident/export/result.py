@@ -47,6 +47,7 @@ def rebuild_entry(estimate: Estimate, training: Observations, validation: Observ
         "robot": _robot_entry(robot),
         "covariance": _packed(estimate.covariance),
         "weights": estimate.weights,
+        "std_kind": estimate.std_kind,
         "standard": estimate.standard if isinstance(estimate, ConsistentEstimate) else None,
         "scene": _scene_entry(effects[0].scene) if effects else None,
         "effects": [_effect_entry(term.effect, term.member) for term in effects],
@@ -57,14 +58,16 @@ def rebuild_entry(estimate: Estimate, training: Observations, validation: Observ
     }
 
 
-def read_identified(path: Path | str, robot: Path | str | None = None, *, determined: bool = False) -> IdentifiedModel:
+def read_identified(
+    path: Path | str, robot: Robot | Path | str | None = None, *, determined: bool = False
+) -> IdentifiedModel:
     """Read the model of an ``identification.json``, or of a ``diagnosis.json`` with the effects found.
 
     Parameters
     ----------
     path : path
-    robot : path, optional
-        A robot description to take instead of the one that the result was found with, where that has moved.
+    robot : Robot or path, optional
+        A robot or its description to take instead of the one that the result was found with, where that has moved.
     determined : bool, optional
         Whether every parameter must be determined.
 
@@ -81,9 +84,12 @@ def read_identified(path: Path | str, robot: Path | str | None = None, *, determ
         raise _damaged(path, error) from error
 
 
-def _model_of(content: Mapping[str, Any], path: Path, robot: Path | str | None, determined: bool) -> IdentifiedModel:
+def _model_of(
+    content: Mapping[str, Any], path: Path, robot: Robot | Path | str | None, determined: bool
+) -> IdentifiedModel:
     known = content[KEY]
-    arm = _robot(known["robot"], path) if robot is None else load_robot(robot)
+    given = robot if robot is None or isinstance(robot, Robot) else load_robot(robot)
+    arm = _robot(known["robot"], path) if given is None else given
     if content["model"] not in MODELS.names():
         raise ScaraIdentError(f"{path}: model {content['model']!r} is not known here; install the package that adds it")
     base = build_model(arm, content["model"])

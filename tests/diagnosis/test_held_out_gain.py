@@ -11,6 +11,7 @@ import pytest
 
 from scara_ident.arrays import Array
 from scara_ident.diagnosis import Diagnosis, diagnose
+from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.evidence import Evidence
 from scara_ident.diagnosis.held_out_gain import HeldOutGain, held_out_gains, shown_of, spoken_against, words_of
 from scara_ident.diagnosis.selection_step import observed
@@ -241,6 +242,10 @@ def test_what_was_shown_is_taken_back_on_the_joint_that_is_worse_and_only_there(
     [
         (1.0, 0.1, True, False),
         (0.55, 0.3, False, False),
+        # Of two thirds a third is removed of what it promises, which it surely lacks; of nine tenths four fifths are.
+        (0.66, 0.1, False, True),
+        (0.66, 0.2, True, False),
+        (0.9, 0.01, True, False),
         (0.4, 0.1, False, True),
         (0.4, 0.25, False, False),
         (0.1, 0.1, False, True),
@@ -249,6 +254,11 @@ def test_what_was_shown_is_taken_back_on_the_joint_that_is_worse_and_only_there(
 def test_what_is_sure_enough_is_said_and_nothing_else(size: float, std: float, borne_out: bool, against: bool):
     gain = HeldOutGain(0.0, size, std, "joint1", 0.1, 0.1)
     assert (gain.borne_out(), gain.against()) == (borne_out, against)
+
+
+def test_how_little_stands_for_another_is_as_of_what_repeats():
+    gain = HeldOutGain(0.1, 0.66, 0.1, "joint1", 0.1, 0.09)
+    assert not gain.against(replace(CRITERIA, least_of_repeatable=0.3))
 
 
 def test_percentages_have_two_digits_and_no_powers_of_ten():

@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from scara_ident.effects import Scene, Signals
-from scara_ident.effects.two_mass import Swing, TwoMasses
+from scara_ident.effects.two_mass import InitialState, Swing, TwoMasses
 from scara_ident.motion.motion import Motion
 from scara_ident.robot.robot import load_robot
 from tests.arms import Array
@@ -138,6 +138,41 @@ def swinging(stiffness: float, damping: float, start: float) -> tuple[Scene, Mot
     change = term.torque(moved, value) - term.torque(item, value)
     change[1] += robot.row_scale[1] * rotor * (item.a[1] - a[1])
     return scene, replace(item, torque=Signals(scene, item).predicted + change), change
+
+
+def test_the_swing_at_the_beginning_is_found_however_far_off_it_is_assumed():
+    count, rate = 2000, 500.0
+    swing = Swing(np.ones(count), np.full(count, 0.8), np.full(count, 25.0**2), 1.0 / rate)
+    free = swing.solve(np.zeros((2, count)), np.array([[1.0, 1.0], [0.0, swing.step]]))
+    torque, true = 100.0 * free[2], np.array([0.01, -2.0])
+    initial = InitialState(free, torque, rate, 20.0, slice(25, count - 25))
+    # As large a lag as a start that is 2 rad/s off makes.
+    found = initial.state(true @ torque, (np.full(count, 0.04), np.full(count, 1.0)))
+    assert np.abs((found - true) @ torque).max() < 1e-4 * np.abs(true @ torque).max()
+    # Of what no torque shows there is no more than was assumed.
+    unseen = InitialState(free, torque * [[1.0], [1e-7]], rate, 20.0, initial.used)
+    assert abs(unseen.state(true @ torque, (np.full(count, 0.04), np.full(count, 1.0)))[1]) < 0.05
+
+
+def test_slopes_are_the_differences_of_the_torque_where_its_first_samples_are_wrong():
+    scene, item = scene_of(load_robot()), moving(load_robot(), 4.0)
+    motor = item.a.copy()
+    # As of positions of which nobody knows what was before.
+    motor[:, 0] += 20.0
+    change = TwoMasses(Signals(scene, item), 1, 4.5, 0.05).change
+    item = replace(item, a=motor)
+    item = replace(item, torque=Signals(scene, item).predicted + change)
+
+    def torque(frequency: float) -> Array:
+        return TwoMasses(Signals(scene, item), 1, frequency, 0.05).change[1, 50:]
+
+    masses = TwoMasses(Signals(scene, item), 1, 4.5, 0.05)
+    # Those of stiffness times the change are had by the share too.
+    share = 2.0 / 4.5 * masses.change[1, 50:]
+    found = dense(masses.slopes(), len(scene.model.rigid_body.columns) + 3)[1, -2, 50:] - share
+    expected = (torque(4.5 + 1e-4) - torque(4.5 - 1e-4)) / 2e-4
+    # What stays of the wrong samples themselves, within the band, and the size of the lag.
+    assert np.abs(found - expected).max() < 0.2 * np.abs(expected).max()
 
 
 @pytest.mark.slow

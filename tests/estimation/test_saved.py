@@ -58,9 +58,9 @@ def test_a_file_that_is_none_or_of_another_robot_is_refused(results: Results, tm
     path = tmp_path / "identification.json"
     with pytest.raises(UsageError, match=r"identification\.json: cannot be read: No such file"):
         load_estimate(path, results.robot)
-    for text in ("{", "[]", '{"parameters": []}', '{"estimate": 3}'):
+    for text in ("{", "[]", "3", '{"parameters": []}', '{"estimate": 3}'):
         path.write_text(text)
-        with pytest.raises(UsageError, match=r"no estimate in it; give the identification\.json that identify wrote"):
+        with pytest.raises(UsageError, match=r"no estimate in it; give the .*json that identify or diagnose wrote"):
             load_estimate(path, results.robot)
     results.identification.save(path)
     with pytest.raises(UsageError, match="of scara03 with the joints joint1, joint2"):
