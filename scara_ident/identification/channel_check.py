@@ -24,10 +24,10 @@ from scara_ident.identification.channel_comparison import (
     mean,
     relative,
 )
-from scara_ident.identification.channel_fault import MENDED, ChannelFault, merged
+from scara_ident.identification.channel_fault import ChannelFault, merged
 from scara_ident.identification.channel_reading import Signal, as_mapped, observed_as, observed_exchanged, turned
 from scara_ident.identification.few_rows import FewRows
-from scara_ident.identification.magnitude_check import signed_fits
+from scara_ident.identification.magnitude_check import unsigned_efforts
 from scara_ident.identification.zero_check import wrong_zeros
 from scara_ident.model.urdf_values import urdf_values
 from scara_ident.motion.prepared import PreparedData
@@ -154,10 +154,10 @@ def _few_left(rows: FewRows, suspect: Suspect) -> float:
 
 
 def _unsigned(observations: Observations) -> ChannelFault | None:
-    """Return the joints whose effort is explained far better as the magnitude of a torque of both signs."""
+    """Return the joints whose effort is predicted far better as the magnitude of a torque of both signs."""
     if few(observations):
         return None
-    fits = {j: fit for j, fit in signed_fits(observations).items() if fit[1] < MENDED * fit[0]}
+    fits = unsigned_efforts(observations)
     if not fits:
         return None
     error, mended = np.exp(np.mean(np.log(np.maximum(list(fits.values()), ROUNDING)), axis=0)).tolist()
