@@ -31,7 +31,7 @@ class ChannelFault:
     rivals : tuple of str
         In words, what leaves as much as these zeros, so that it may be that instead.
     unsigned : bool
-        Whether the effort is a magnitude; its errors are those of the fit, of these joints alone.
+        Whether the effort is a magnitude; its errors are of these joints alone.
     by_bodies : bool
         Whether gravity and inertia told that every effort has the opposite sign, of which no residual speaks.
     """

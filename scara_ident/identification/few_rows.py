@@ -14,6 +14,7 @@ from scara_ident.model.model import TorqueModel
 from scara_ident.motion.low_pass import low_pass
 from scara_ident.motion.motion import Motion
 from scara_ident.motion.prepared import PreparedStretch
+from scara_ident.threads import side_by_side
 
 # Samples that readings are compared by, as many times as there are parameters.
 SAMPLES = 6
@@ -72,8 +73,7 @@ class FewRows:
             if reading not in self._left:
                 motions = tuple(JointReading(1, own.position, own.quarters) for own in reading)
                 alike.setdefault(motions, []).append(reading)
-        for motions, own in alike.items():
-            self._fit(motions, own)
+        side_by_side(self._fit, alike.keys(), alike.values())
 
     def _fit(self, motions: Reading, readings: list[Reading]) -> None:
         products, along, power = self._products(motions)
@@ -116,14 +116,15 @@ def _left(products: Array, along: Array, power: Array) -> Array:
     return left
 
 
-def few_rows(observations: Observations) -> FewRows:
-    """Take samples evenly over all recordings."""
+def few_rows(observations: Observations, *, widest: bool = False) -> FewRows:
+    """Take samples evenly over all recordings, within the narrowest band of all joints or the widest: one for all."""
     parts = [part for part in observations.data.stretches if part.usable]
     wanted = SAMPLES * observations.parameters
     inside = sum(part.samples - 2 * part.trim for part in parts)
     step = max(1, inside // wanted)
     taken: list[list[Array]] = []
-    band = min((own for own in observations.data.bands if own is not None), default=None)
+    chosen = max if widest else min
+    band = chosen((own for own in observations.data.bands if own is not None), default=None)
     for part in parts:
         at = np.arange(part.trim, part.samples - part.trim, step)
         motion, moves = part.motion, part.used & _away_from_turns(part, band)

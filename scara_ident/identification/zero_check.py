@@ -15,7 +15,7 @@ from scara_ident.estimation.urdf_gravity import near_axis, urdf_gravity
 from scara_ident.identification.channel_comparison import ALIKE, far_less, friction_pushes, held_out, mean
 from scara_ident.identification.channel_fault import ChannelFault, faults_of, in_words
 from scara_ident.identification.channel_reading import JointReading, Reading, as_mapped, has_zeros, observed_as
-from scara_ident.identification.few_rows import FewRows, few_rows
+from scara_ident.identification.few_rows import FewRows
 from scara_ident.identification.reading_search import SAME, ZERO_COST, cost, searched
 from scara_ident.model.model import TorqueModel
 from scara_ident.model.terms.rigid_body import RigidBody, rigid_body
@@ -40,8 +40,6 @@ class WrongZeros:
     left, few_left : float
         What it leaves of the torque of all joints, geometric mean, on blocks that it was not fitted to, and of few rows.
     observations : Observations
-    rows : FewRows
-        As mapped.
     """
 
     reading: Reading
@@ -51,7 +49,6 @@ class WrongZeros:
     left: float
     few_left: float
     observations: Observations
-    rows: FewRows
 
     def faults(self, joints: Sequence[str]) -> list[ChannelFault]:
         """Return what is wrong with the mapping."""
@@ -59,7 +56,7 @@ class WrongZeros:
 
 
 def wrong_zeros(
-    held: Observations, before: tuple[Array, Array], pushing: NDArray[np.bool_], most: float
+    held: Observations, rows: FewRows, before: tuple[Array, Array], pushing: NDArray[np.bool_], most: float
 ) -> WrongZeros | None:
     """Return the reading with other zeros that explains recordings, if one does and neither signs nor gravity do as simply.
 
@@ -68,6 +65,8 @@ def wrong_zeros(
     Parameters
     ----------
     held : Observations
+    rows : FewRows
+        Of them.
     before : tuple of ndarray
         What `held_out` says of them.
     pushing : ndarray of bool, shape (n,)
@@ -75,7 +74,6 @@ def wrong_zeros(
     most : float
         Share of the torque that a reading may leave at most.
     """
-    rows = few_rows(held)
     tried = searched(rows)
     chosen, others = _simplest(tried)
     if not has_zeros(chosen):
@@ -108,7 +106,7 @@ def _counted(
     pushed = np.count_nonzero(friction_pushes(weighted_value(other.by_joint), other))
     if said is None or pushed > np.count_nonzero(pushing):
         return None
-    return WrongZeros(reading, rivals, *said, mean(then[1]), mean(rows.left(reading)), other, rows)
+    return WrongZeros(reading, rivals, *said, mean(then[1]), mean(rows.left(reading)), other)
 
 
 def _simplest(tried: dict[Reading, float]) -> tuple[Reading, list[Reading]]:

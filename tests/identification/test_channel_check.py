@@ -7,11 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_info
 
 from scara_ident.diagnosis import diagnose
 from scara_ident.errors import EstimationError, RecordingError
 from scara_ident.estimation.least_squares import weighted_value
 from scara_ident.estimation.observations import observe
+from scara_ident.identification import channel_check
 from scara_ident.identification.channel_check import channel_faults
 from scara_ident.identification.channel_comparison import friction_pushes, relative
 from scara_ident.identification.channel_fault import ChannelFault
@@ -24,6 +26,7 @@ from scara_ident.report.identification import sentences
 from scara_ident.robot.robot import Robot, load_robot
 from scara_ident.simulation import sampled, simulate, virtual_arm
 from tests.arms import PLANAR_2R, Link, noisy, recorded_torque, recording, sines, swing, write_urdf
+from tests.identification import turned_arm
 
 BANDS = (10.0, 10.0)
 
@@ -239,6 +242,35 @@ def test_an_exchange_shows_in_a_band_that_it_left_narrow(
     wrong = [wandering(exchanged(item, *signals), 0.0, 0) for item in recordings]
     faults = channel_faults(observe(build_model(virtual_arm().robot, "complete"), prepare(wrong, (1.0, 1.0))))
     assert [(fault.signal, fault.exchanged) for fault in faults] == [(" and ".join(signals), True)]
+
+
+def test_readings_that_leave_as_much_of_few_rows_are_not_observed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing reads a spring away; of the readings of an arm that is explained so badly nearly every one was observed."""
+    robot = turned_arm.arm()
+    sprung = turned_arm.seen(robot, turned_arm.runs(robot, (0,) * 4, added=np.array([8.0, 8.0, 0.0, 0.0])))
+    asked: list[str] = []
+    for name in ("observed_as", "observed_exchanged"):
+        own = getattr(channel_check, name)
+        monkeypatch.setattr(channel_check, name, lambda *given, own=own: asked.append("") or own(*given))
+    assert channel_faults(sprung) == ()
+    few = len(asked)
+    monkeypatch.setattr(channel_check, "FEW_LESS", np.inf)
+    assert channel_faults(sprung) == ()
+    assert 2 * few < len(asked) - few
+
+
+def test_readings_are_fitted_on_one_blas_thread(
+    recordings: tuple[Recording, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    used: list[int] = []
+
+    def asked(*_: object) -> tuple[ChannelFault, ...]:
+        used.extend(pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas")
+        return ()
+
+    monkeypatch.setattr(channel_check, "_faults", asked)
+    assert faults_of(list(recordings)) == ()
+    assert set(used) == {1}
 
 
 def test_the_share_left_is_what_it_says(recordings: tuple[Recording, ...]) -> None:

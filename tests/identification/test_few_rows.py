@@ -6,9 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from scara_ident.estimation.observations import observe
 from scara_ident.identification.channel_comparison import held_out
 from scara_ident.identification.channel_reading import JointReading, as_mapped, observed_as, turned, with_joint
 from scara_ident.identification.few_rows import few_rows
+from scara_ident.motion.low_pass import low_pass
 from tests.identification.turned_arm import arm, runs, seen
 
 
@@ -47,3 +49,14 @@ def test_exchanged_samples_are_those_of_exchanged_recordings() -> None:
     assert np.allclose(found.q, right.q) and np.allclose(found.torque, right.torque)
     # Where a joint counts is that of its own column, whose rests are those of the other.
     assert found.left(as_mapped(4)).max() < 0.1
+
+
+def test_one_band_for_all_is_the_narrowest_or_the_widest() -> None:
+    """A joint whose own was left too narrow hides all others in it."""
+    robot = arm()
+    held = seen(robot, runs(robot, (0,) * 4))
+    held = observe(held.model, held.data.at((5.0, 1.0, 5.0, 5.0)))
+    part = held.data.stretches[0]
+    for widest, band in ((False, 1.0), (True, 5.0)):
+        first = few_rows(held, widest=widest).torque[:, 0]
+        assert np.allclose(first, low_pass(part.torque, part.rate, band)[:, part.trim])
