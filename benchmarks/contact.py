@@ -53,6 +53,16 @@ SHORT = 600.0
 FACTOR = 1.5
 
 
+class Aim(NamedTuple):
+    """What is pushed: a link, or the tool, and how far from its origin, m."""
+
+    link: str | None = None
+    beside: float = 0.0
+
+
+AT_TOOL = Aim()
+
+
 class Try(NamedTuple):
     """A push, its size in N, whether it was found, and at the tool, and how far off the stated force is, in std."""
 
@@ -68,20 +78,30 @@ def main() -> None:
     parser.add_argument("--robot", choices=("scara03", "ur5", "panda"), default="scara03")
     parser.add_argument("--recordings", type=int, default=370, help="without contact, of 20 s")
     parser.add_argument("--pushed", type=int, default=40, help="recordings with pushes, of four or five each")
+    parser.add_argument(
+        "--beside", type=float, default=0.0, help="how far from the tool, or a link's origin, pushes act, m"
+    )
+    parser.add_argument("--link", help="link that is pushed, by default the tool's")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--measured", type=Path, help="folder with robot.yaml and recordings")
     parser.add_argument("--fit", nargs="+", default=[], help="recordings of it to identify from")
     parser.add_argument("--rates", type=float, nargs="+", default=RATES, help="stated per hour")
     parser.add_argument("--output", type=Path)
     given = parser.parse_args()
-    found = measured(given.measured, given.fit, given.seed, given.rates) if given.measured else virtual(given.robot, given.recordings, given.pushed, given.seed, given.rates)  # fmt: skip
+    if given.measured:
+        found = measured(given.measured, given.fit, given.seed, given.rates)
+    else:
+        aim = Aim(given.link, given.beside)
+        found = virtual(given.robot, given.recordings, given.pushed, given.seed, given.rates, aim)
     print("\n".join(table(found)))
     if given.output:
         given.output.parent.mkdir(parents=True, exist_ok=True)
         given.output.write_text(json.dumps(found, indent=1) + "\n")
 
 
-def virtual(name: str, count: int, pushed_count: int, seed: int, rates: Sequence[float]) -> dict[str, Any]:
+def virtual(
+    name: str, count: int, pushed_count: int, seed: int, rates: Sequence[float], aim: Aim = AT_TOOL
+) -> dict[str, Any]:
     """Count on a virtual arm."""
     arm = virtual_arm(load_robot(None if name == "scara03" else name))
     made = [record(arm, seed, k) for k in range(6 + count)]
@@ -96,7 +116,9 @@ def virtual(name: str, count: int, pushed_count: int, seed: int, rates: Sequence
     tries: list[Try] = []
     for k in range(pushed_count):
         rng = np.random.default_rng([seed, 10_000 + k])
-        pushes = [drawn(arm, rng, start, FORCES[name]) for start in np.arange(2.0, SECONDS - 2.0, APART)]
+        pushes = [
+            aimed(drawn(arm, rng, start, FORCES[name]), arm, aim, rng) for start in np.arange(2.0, SECONDS - 2.0, APART)
+        ]
         pushed, without = (observer.observe(record(arm, seed, 20_000 + k, with_)) for with_ in (pushes, ()))
         tries += looked_for(observer, pushed, without, pushes)
     return {"arm": name, "false_alarms": rows, **smallest(tries)}
@@ -118,6 +140,15 @@ def drawn(arm: VirtualArm, rng: np.random.Generator, start: float, forces: tuple
     return Push(
         force=float(np.exp(rng.uniform(*np.log(forces)))), time=float(start), duration=LASTING, direction=(x, y, z)
     )
+
+
+def aimed(push: Push, arm: VirtualArm, aim: Aim, rng: np.random.Generator) -> Push:
+    """Return a push on a point beside where it was, in a random direction, or on a link."""
+    if aim == AT_TOOL:
+        return push
+    direction = rng.normal(size=3)
+    x, y, z = (arm.tool if aim.link is None else np.zeros(3)) + aim.beside * direction / np.linalg.norm(direction)
+    return replace(push, link=aim.link, point=(x, y, z))
 
 
 def alarms(observer: ContactObserver, rate: float, splits: Sequence[tuple[list[Observed], list[Observed]]]) -> dict[str, Any]:  # fmt: skip

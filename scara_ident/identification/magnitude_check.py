@@ -43,29 +43,38 @@ def unsigned_efforts(observations: Observations) -> dict[int, tuple[float, float
         Of each such joint what is left of the effort held out, as a share of it, by a torque of its own sign and by a magnitude.
     """
     found = {}
-    for j, (plain, signed) in signed_fits(observations).items():
-        if signed < MENDED * plain:
-            said = _predicted(_joint(observations, j))
+    for j, tried in signed_fits(observations).items():
+        if tried.left < MENDED * tried.plain:
+            said = _predicted(tried.joint, tried.signs)
             if said is not None:
                 found[j] = said
     return found
 
 
-def signed_fits(observations: Observations) -> dict[int, tuple[float, float]]:
+@dataclass(frozen=True, eq=False)
+class SignedFit:
+    """An effort that never changes its sign, fitted as a magnitude.
+
+    Attributes
+    ----------
+    plain, left : float
+        What is left of the torque, as a share of it, as logged and with signs.
+    signs : list of ndarray, shape (N,)
+        Of every stretch.
+    """
+
+    plain: float
+    left: float
+    joint: _Joint
+    signs: list[Array]
+
+
+def signed_fits(observations: Observations) -> dict[int, SignedFit]:
     """Fit efforts that never change their sign as they are, and as magnitudes of a torque of both signs.
 
     Signs and parameters are found in turns, from where friction, or the URDF's bodies, change the sign; a joint that is
-    loaded from one side only keeps its sign, and is explained no better.
-
-    Parameters
-    ----------
-    observations : Observations
-
-    Returns
-    -------
-    dict of int to (float, float)
-        Of each joint that moves both ways under an effort of one sign, and is explained badly, what is left of the torque as a
-        share of it, as logged and with signs.
+    loaded from one side only keeps its sign, and is explained no better. It is done for each joint that moves both ways under an
+    effort of one sign, and is explained badly.
     """
     found = {}
     parts = [part for part in observations.data.stretches if part.usable]
@@ -79,8 +88,9 @@ def signed_fits(observations: Observations) -> dict[int, tuple[float, float]]:
         alone = observations.by_joint[j]
         size, plain = alone.torque_rms, alone.rms()
         if plain > LEAST_LEFT * size:
-            fit = _fitted(_joint(observations, j))
-            found[j] = plain / size, fit.left / float(np.linalg.norm(rows.table[-1]))
+            joint = _joint(observations, j)
+            fit = _fitted(joint)
+            found[j] = SignedFit(plain / size, fit.left / float(np.linalg.norm(rows.table[-1])), joint, fit.signs)
     return found
 
 
@@ -179,11 +189,13 @@ def _settled(joint: _Joint, signs: list[Array], inverse: Array, use: NDArray[np.
     return best
 
 
-def _predicted(joint: _Joint) -> tuple[float, float] | None:
-    """Return what a torque, and the magnitude of one, leave of rows held out, where the missing sign is seen there; else None."""
+def _predicted(joint: _Joint, signs: list[Array]) -> tuple[float, float] | None:
+    """Return what a torque, and the magnitude of one, leave of rows held out, where the missing sign is seen there; else None.
+
+    Signs are those of a fit to all rows.
+    """
     size = float(np.linalg.norm(joint.torque))
     side = 1.0 if sum(float(np.sum(part.torque[joint.place])) for part in joint.parts) >= 0.0 else -1.0
-    signs = _fitted(joint).signs
     # An offset keeps a sign too, of which some models have none.
     plain = np.vstack([joint.columns, joint.rows([np.ones(part.samples) for part in joint.parts])])
     as_logged, as_magnitude, torque = (np.zeros(len(joint.torque)) for _ in range(3))

@@ -61,15 +61,31 @@ def tool_frame(robot: Robot, link: str | None = None) -> pin.Frame:
 
 def force_torques(robot: Robot, configurations: Iterable[Array]) -> Iterator[Array]:
     """Give what a unit of each force on the tool, base frame, is at the joints, recorded side, shape (n, 3): ``J.T``."""
+    return (each[..., 0] for each in leaning_torques(robot, configurations))
+
+
+def leaning_torques(robot: Robot, configurations: Iterable[Array]) -> Iterator[Array]:
+    """Give what a unit of each force on the last link, base frame, is at the joints, recorded side, shape (n, 3, 4).
+
+    The last axis is for a force on the tool, and what a metre more along each axis of the tool's frame adds to that.
+    """
     frame = robot.model.getFrameId(tool_frame(robot).name, pin.FrameType.BODY)
     data = robot.model.createData()
     for q in configurations:
         jacobian = pin.computeFrameJacobian(robot.model, data, q, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
         # Of a single joint it comes as a vector.
-        yield (jacobian.reshape(6, -1)[:3, robot.order] * robot.row_scale).T
+        both = jacobian.reshape(6, -1)[:, robot.order] * robot.row_scale
+        moved = np.cross(both[3:].T[:, None, :], data.oMf[frame].rotation.T)
+        yield np.concatenate([both[:3].T[..., None], moved.swapaxes(1, 2)], axis=2)
 
 
-def constant_force(rows: Sequence[Array], torques: Sequence[Array]) -> tuple[Array, float]:
+def tool_placement(robot: Robot) -> tuple[Array, Array]:
+    """Return how the tool's frame stands in that of the link that carries it: rotation (3, 3) and origin, m, (3,)."""
+    placement = tool_frame(robot).placement
+    return np.array(placement.rotation), np.array(placement.translation)
+
+
+def constant_force(rows: Sequence[Array] | Array, torques: Sequence[Array] | Array) -> tuple[Array, float]:
     """Return the force, N, shape (3,), of which rows (n, 3) make torques (n,) best, and the share of their square that it explains."""
     matrix, right = np.concatenate(rows), np.concatenate(torques)
     force = np.asarray(np.linalg.lstsq(matrix, right, rcond=UNFELT)[0])
@@ -77,7 +93,7 @@ def constant_force(rows: Sequence[Array], torques: Sequence[Array]) -> tuple[Arr
     return force, 1.0 - float(np.sum((right - matrix @ force) ** 2)) / total if total > 0.0 else 0.0
 
 
-def force_covariance(rows: Sequence[Array], products: Array) -> Array:
+def force_covariance(rows: Sequence[Array] | Array, products: Array) -> Array:
     """Return the covariance of `constant_force`, shape (3, 3), N^2; NaN along axes that rows (n, 3) do not tell.
 
     Parameters
@@ -98,7 +114,7 @@ def felt_directions(robot: Robot, configurations: Iterable[Array]) -> int:
     return int(np.sum(singular > UNFELT * singular[0]))
 
 
-def told_at_once(rows: Sequence[Array], directions: int) -> float:
+def told_at_once(rows: Sequence[Array] | Array, directions: int) -> float:
     """Return how well single rows (n, 3) of `constant_force` tell the last of so many directions, over the first.
 
     It is small near a singular pose, where that direction is told by how the arm turns meanwhile, and so by how constant the force

@@ -11,20 +11,14 @@ import numpy as np
 from scara_ident.arrays import Array
 from scara_ident.estimation.tail import clusters
 from scara_ident.recording.recording import Recording
-from scara_ident.robot.kinematics import constant_force, force_covariance, force_torques, told_at_once
+from scara_ident.robot.kinematics import place_of
 from scara_ident.robot.robot import Robot
+from scara_ident.use.contact_force import LEAST_JOINTS, STRONG, ContactForce, contact_force
 from scara_ident.use.external_torque import FEATURES, Observed
 from scara_ident.use.observer import ContactObserver
 
 # A joint is named with a contact if its mean reaches this share of its threshold while the contact is strong.
 NAMED = 0.5
-# A constant force at the tool explains at least this share of the squared torque of a contact there, on at least so many
-# joints: on fewer nearly any torque is that of some force.
-FITS, LEAST_JOINTS = 0.75, 3
-# Of a direction of the force that is told so much worse than another at once, none is told.
-LEAST_TOLD = 0.03
-# States of a contact at which the tool's Jacobian is taken, and the share of its peak from which on they are fitted.
-STATES, STRONG = 80, 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,12 +38,8 @@ class Contact:
         Mean external torque while it is strong, recorded side.
     place : str
         ``tool``, or the outermost link that it may act on, as told by the joints that it loads.
-    force : ndarray, shape (3,), or None
-        Constant force on the tool that explains it, base frame, N; a direction that the arm cannot feel is 0.
-    force_covariance : ndarray, shape (3, 3), or None
-        Of that force, by the residual without contact; NaN along axes that the arm does not tell.
-    explained : float
-        Share of the squared torque that such a force explains.
+    told : ContactForce
+        What its torque says of the force.
     """
 
     recording: str
@@ -59,9 +49,22 @@ class Contact:
     score: float
     torque: Array
     place: str
-    force: Array | None
-    force_covariance: Array | None
-    explained: float
+    told: ContactForce
+
+    @property
+    def force(self) -> Array | None:
+        """Constant force on the place that explains it, base frame, N, shape (3,); None where it is not told."""
+        return self.told.force
+
+    @property
+    def force_covariance(self) -> Array | None:
+        """Of that force, by the residual without contact, shape (3, 3); NaN along axes that the arm does not tell."""
+        return self.told.covariance
+
+    @property
+    def explained(self) -> float:
+        """Share of the squared torque that a constant force on the tool explains."""
+        return self.told.explained
 
     @property
     def force_words(self) -> str:
@@ -73,6 +76,14 @@ class Contact:
         # Along an axis that is not told the force is zero.
         std = float(np.sqrt(along @ np.nan_to_num(self.force_covariance) @ along))
         return f"{size:.3g} ± {std:.1g} N"
+
+    @property
+    def point_words(self) -> str:
+        """Where on its link the force acts beside the tool, m; a dash where that is not told."""
+        point, std = self.told.point, self.told.point_std
+        if point is None or std is None:
+            return "-"
+        return ", ".join(f"{x:.3f} ± {unsure:.1g}" for x, unsure in zip(point, std, strict=True))
 
     @property
     def entry(self) -> dict[str, Any]:
@@ -87,6 +98,8 @@ class Contact:
             "place": self.place,
             "force": None if self.force is None else self.force.tolist(),
             "force_std": None if self.force_covariance is None else np.sqrt(np.diag(self.force_covariance)).tolist(),
+            "point": None if self.told.point is None else self.told.point.tolist(),
+            "point_std": None if self.told.point_std is None else self.told.point_std.tolist(),
             "explained": self.explained,
         }
 
@@ -111,8 +124,11 @@ def _contact(observer: ContactObserver, observed: Observed, threshold: Array, sh
     mean = np.mean(observed.torque[:, strong], axis=1)
     most = np.abs(mean) / np.mean(threshold[:, strong], axis=1)
     named = [int(j) for j in np.argsort(-most) if most[j] >= min(NAMED, float(np.max(most)))]
-    force, covariance, explained = tool_force(observer, observed, threshold, inside, strong)
-    at_tool = explained >= FITS and len(named) >= min(LEAST_JOINTS, robot.n)
+    told = contact_force(observer, observed, threshold, inside, strong)
+    if told.at_tool and len(named) < min(LEAST_JOINTS, robot.n):
+        told = ContactForce(told.explained, False)
+    at_last = told.force is not None and not told.at_tool
+    outermost = place_of(robot, robot.model.njoints - 1) if at_last else _outermost(robot, named)
     return Contact(
         observed.name,
         float(observed.time[span.start]),
@@ -120,55 +136,14 @@ def _contact(observer: ContactObserver, observed: Observed, threshold: Array, sh
         tuple(robot.joints[j] for j in named),
         float(np.max(size)),
         mean,
-        "tool" if at_tool else robot.links[_outermost(robot, named)],
-        force if at_tool else None,
-        covariance if at_tool else None,
-        explained,
+        "tool" if told.at_tool else robot.links[outermost],
+        told,
     )
 
 
 def _outermost(robot: Robot, joints: Sequence[int]) -> int:
     """Return the joint farthest from the base, among those loaded."""
     return max(joints, key=lambda joint: int(robot.order[joint]))
-
-
-def tool_force(
-    observer: ContactObserver, observed: Observed, threshold: Array, inside: Array, strong: Array
-) -> tuple[Array | None, Array | None, float]:
-    """Return the constant force on the tool, base frame, N, that fits samples best, its covariance, and the share it explains.
-
-    A force f on the tool at the end of the Jacobian J is the external torque ``J^T f``, of which the observer tells what its
-    low-pass leaves as the arm moves on. Joints are weighted by their thresholds. The residual, and what the force does not explain
-    since it is not constant, are taken for the same throughout a contact: they change slowly, and no mean lessens them.
-
-    Near a singular pose there is no force and no covariance: an arm that does not feel one of the directions at once takes any change
-    of the force for more or less of it.
-
-    Parameters
-    ----------
-    threshold : ndarray, shape (n, N)
-    inside, strong : ndarray of int
-        Samples of the contact, and those of them that are fitted.
-    """
-    places = inside[:: max(1, len(inside) // STATES)]
-    states = (observer.external.arm.configuration(observed.position[:, k]) for k in places)
-    share = 1.0 - np.exp(-2.0 * np.pi * observer.settings.bandwidth * np.diff(observed.time[places]))
-    # At its begin as much of it has passed the low-pass as of the largest torque.
-    size = np.max(np.abs(observed.torque[:, inside]) / threshold[:, inside], axis=0)
-    share = np.concatenate([size[:1] / np.max(size), share])
-    rows, torques, seen = [], [], 0.0
-    for k, turned, new in zip(places, force_torques(observer.known.robot, states), share, strict=True):
-        seen = seen + new * (turned - seen)
-        if k in strong:
-            rows.append(seen / threshold[:, k, None])
-            torques.append(observed.torque[:, k] / threshold[:, k])
-    force, explained = constant_force(rows, torques)
-    if told_at_once(rows, observer.felt) < LEAST_TOLD:
-        return None, None, explained
-    usual = np.mean(threshold[:, strong], axis=1)
-    scatter = observer.scatter.covariance(np.mean(observed.features[:, :, strong], axis=2))
-    left = np.array([own - row @ force for own, row in zip(torques, rows, strict=True)])
-    return force, force_covariance(rows, scatter / usual[:, None] / usual + left.T @ left / len(left)), explained
 
 
 @dataclass(frozen=True, eq=False)

@@ -115,7 +115,7 @@ def test_signs_that_few_samples_are_fitted_with_are_not_believed(robot: Robot, s
     assert run.effort is not None
     load = 1.001 * np.min(run.effort, axis=1, keepdims=True)
     observations = seen_basic(robot, replace(run, effort=run.effort - load))
-    assert any(signed < 0.5 * plain for plain, signed in signed_fits(observations).values())
+    assert any(tried.left < 0.5 * tried.plain for tried in signed_fits(observations).values())
     assert unsigned_efforts(observations) == {}
     # What moves for as short a time and has no sign is told.
     (fault,) = channel_faults(seen_basic(robot, unsigned(standing(robot, seed, 0.0), 0, 1)))
@@ -131,7 +131,7 @@ def test_an_offset_is_no_friction_without_its_sign(robot: Robot) -> None:
     """Of a model without offset, of which the friction's magnitude takes its place."""
     still = [replace(run, effort=np.full_like(run.effort, 2.0)) for run in runs(robot) if run.effort is not None]
     observations = observe(build_model(robot, "reduced"), prepare(still, (8.0, 8.0)))
-    assert signed_fits(observations)[0][1] < 0.1
+    assert signed_fits(observations)[0].left < 0.1
     assert unsigned_efforts(observations) == {}
 
 

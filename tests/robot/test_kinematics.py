@@ -15,10 +15,12 @@ from scara_ident.robot.kinematics import (
     felt_directions,
     force_covariance,
     force_torques,
+    leaning_torques,
     parent,
     place_of,
     told_at_once,
     tool_frame,
+    tool_placement,
 )
 from scara_ident.robot.robot import load_robot
 from tests.arms import example_urdf
@@ -83,6 +85,22 @@ def test_a_force_on_the_tool_is_found_from_what_it_is_at_the_joints():
         np.testing.assert_allclose(found[:told], force[:told], atol=1e-9)
         assert share == pytest.approx(1.0)
     assert constant_force(rows, [np.zeros(6)] * 20)[1] == 0.0
+
+
+def test_a_force_beside_the_tool_is_what_its_power_says():
+    robot, rng = load_robot(example_urdf("ur5_robot.urdf")), np.random.default_rng(0)
+    state, speed, force, beside = (rng.standard_normal(size) for size in (robot.model.nq, robot.n, 3, 3))
+    turn, origin = tool_placement(robot)
+    data, turned = robot.model.createData(), np.zeros(robot.n)
+    turned[robot.order] = speed
+    pin.forwardKinematics(robot.model, data, state, turned)
+    link = robot.model.njoints - 1
+    moved = pin.getVelocity(robot.model, data, link, pin.LOCAL_WORLD_ALIGNED)
+    lever = data.oMi[link].rotation @ (origin + turn @ beside)
+    power = force @ (moved.linear + np.cross(moved.angular, lever))
+    (rows,) = leaning_torques(robot, [state])
+    torque = rows @ np.append(1.0, beside) @ force
+    assert torque @ (speed / robot.row_scale) == pytest.approx(power)
 
 
 def test_the_covariance_of_a_force_is_that_of_forces_found_beside_errors():

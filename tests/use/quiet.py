@@ -55,13 +55,17 @@ def moved_from(run: Recording, pose: np.ndarray, size: float) -> Recording:
     return recording(robot, run.name, run.time, q, recorded_torque(robot, q, v, a, FRICTION) + noise, velocity=v)
 
 
-def pushed(item: Recording, force: np.ndarray, start: float, stop: float, joints: int = 6) -> Recording:
-    """Return a run with a force on the tool, or the like on the first joints only."""
+def pushed(
+    item: Recording, force: np.ndarray, start: float, stop: float, joints: int = 6, beside: np.ndarray | None = None
+) -> Recording:
+    """Return a run with a force on the tool, or beside it in the tool's frame, or the like on the first joints only."""
     robot = ur5()
     frame, data = robot.model.getFrameId(tool_frame(robot).name, pin.FrameType.BODY), robot.model.createData()
     effort = item.effort.copy()
     for k in np.flatnonzero((item.time >= start) & (item.time <= stop)):
         q = item.position[np.argsort(robot.order), k]
         jacobian = pin.computeFrameJacobian(robot.model, data, q, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
-        effort[:joints, k] -= (jacobian[:3].T @ force)[robot.order][:joints]
+        lever = np.zeros(3) if beside is None else data.oMf[frame].rotation @ beside
+        load = jacobian.T @ np.concatenate([force, np.cross(lever, force)])
+        effort[:joints, k] -= load[robot.order][:joints]
     return replace(item, effort=effort, name="pushed")

@@ -9,7 +9,8 @@ from scara_ident.report.html.blocks import Block, Cell, Group, Paragraph, Select
 from scara_ident.report.html.page import Page, parts
 from scara_ident.report.html.section import NamedSection
 from scara_ident.report.plot import Drawing, Figure, Layer, Panel, Plot, Region, single, thin_line
-from scara_ident.use.contact import LEAST_JOINTS, ContactFindings, sentences
+from scara_ident.use.contact import ContactFindings, sentences
+from scara_ident.use.contact_force import LEAST_JOINTS
 from scara_ident.use.external_torque import Observed
 
 # Points of a line and recordings drawn, at the most.
@@ -63,6 +64,7 @@ def _contacts(found: ContactFindings) -> list[Block]:
                 number(each.score),
                 each.place,
                 each.force_words,
+                each.point_words,
             ]
         )
     told = f"{LEAST_JOINTS} joints or more" if robot.n > LEAST_JOINTS else "all joints"
@@ -70,8 +72,10 @@ def _contacts(found: ContactFindings) -> list[Block]:
         "Torque is the mean on the first joint while it is strong, on the side where effort is recorded. The place is the tool where a constant force "
         f"there explains the torque of {told}, else the outermost link that is loaded: the contact is there or farther out."
     )
-    head = ("recording", "from [s]", "to [s]", "joints", "torque", "over threshold", "place", "force")
-    return [Paragraph(words), Table(head, rows, (1, 2, 4, 5, 7))] if rows else []
+    if any(each.told.point is not None for each in found.contacts):
+        words += " A force that is told beside the tool acts on a point of that link, given in its frame, as near to the tool as the torque allows."
+    head = ("recording", "from [s]", "to [s]", "joints", "torque", "over threshold", "place", "force", "point [m]")
+    return [Paragraph(words), Table(head, rows, (1, 2, 4, 5, 7, 8))] if rows else []
 
 
 def _torque(found: ContactFindings) -> list[Block]:
