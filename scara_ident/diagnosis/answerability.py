@@ -382,7 +382,7 @@ def inquiry_of(content: Mapping[str, Any], robot: Robot, recordings: Sequence[Re
     if not recordings:
         scene = _unseen(model, value, bands, armatures)
         return Inquiry(scene, asked, in_model, noise, bands, tried=tried)
-    observations = observe(model, usable_in_bands(model, recordings, (), bands, alike=True)[0])
+    observations = observe(model, usable_in_bands(model, recordings, (), bands, alike=True, held=True)[0])
     scene = scene_of(model, value, observations)
     scene = replace(scene, armatures={**scene.armatures, **armatures})
     inquiry = Inquiry(scene, asked, in_model, noise, bands, tried=tried)

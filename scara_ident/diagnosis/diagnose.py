@@ -225,7 +225,7 @@ def diagnose(
     given = bands is not None
     if not given:
         work("choosing the band")
-    data, held_out, notes = usable_in_bands(base, recordings, validation, bands, alike=True)
+    data, held_out, notes = usable_in_bands(base, recordings, validation, bands, alike=True, held=True)
     observations = observe(base, data)
     check_rows(observations)
     faults = channel_faults(observations)

@@ -10,6 +10,7 @@ import numpy as np
 from scara_ident.errors import RecordingError, UsageError
 from scara_ident.estimation.bands import BandChoice, choose_bands
 from scara_ident.estimation.observations import Observations, kept_rows
+from scara_ident.identification.held_at_once import held_at_once
 from scara_ident.memory import keep_freed
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.motion import torque_of
@@ -30,6 +31,7 @@ def usable_in_bands(
     bands: Sequence[float | None] | None = None,
     *,
     alike: bool = False,
+    held: bool = False,
 ) -> tuple[PreparedData, PreparedData, list[str]]:
     """Make recordings ready in their bands, without those that say nothing.
 
@@ -43,6 +45,8 @@ def usable_in_bands(
         Hz; chosen from the recordings by default.
     alike : bool, optional
         Whether a choice gives all joints the widest of their bands.
+    held : bool, optional
+        Whether of more samples than a diagnosis holds some are chosen, see `held_at_once`.
 
     Returns
     -------
@@ -62,6 +66,9 @@ def usable_in_bands(
     data, useless = usable_data(recordings)
     held_out, more = usable_data(validation)
     notes = [*useless, *more, *data_notes(data, held_out)]
+    if held:
+        data, held_out, more = held_at_once(data, held_out)
+        notes += more
     useless = []
     if bands is None:
         chosen, data, useless = _bands_of(model, data, alike=alike)

@@ -120,9 +120,9 @@ def contact_force(
             return ContactForce(explained, True)
         covariance = force_covariance(at_tool, fitted.scatter + left.T @ left / len(left))
         if beside is not None:
-            # By how much it would be another force a little beside the tool nobody knows better.
-            other = _beside_tool(fitted, unsure, beside.force, beside.point).force - force
-            covariance = covariance + np.outer(other, other)
+            # Nobody knows that it is on the tool to the millimetre: it is as unsure as a force near the tool, and as what that would be.
+            near = _beside_tool(fitted, unsure, beside.force, beside.point)
+            covariance = near.covariance[:3, :3] + np.outer(near.force - force, near.force - force)
         return ContactForce(explained, True, force, covariance)
     last = place_of(robot, robot.model.njoints - 1)
     loaded = abs(float(np.mean(fitted.torques[:, last]))) > LOADED * float(np.sqrt(unsure[last, last]))

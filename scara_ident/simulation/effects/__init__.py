@@ -108,6 +108,8 @@ def parse_effect(text: str) -> Effect:
             key, _, value = (word.strip() for word in pair.partition("="))
             attribute = {**kind.parameter_names(), "recording": "recording"}.get(key)
             if attribute is None:
+                if key == "joint" and value:
+                    raise UsageError(f"effect {text!r}: name the joint before the values: {name}:{value}:KEY=VALUE")
                 known = ", ".join((*kind.parameter_names(), "recording"))
                 raise UsageError(f"effect {text!r}: {kind.name} has no {key!r}; it has {known}")
             if attribute in values:
