@@ -104,8 +104,8 @@ def noise_shares(data: PreparedData) -> list[float]:
             if band is None or not np.any(part.used[joint]):
                 continue
             step, level = sizes[joint]
-            noise = level if step is None else step / np.sqrt(12.0)
-            power = 2.0 * noise**2 / part.rate * (2.0 * np.pi) ** 4 * band**5 / 5.0
+            noise = level**2 + (0.0 if step is None else step**2 / 12.0)
+            power = 2.0 * noise / part.rate * (2.0 * np.pi) ** 4 * band**5 / 5.0
             whole = float(np.mean(part.motion.a[joint][part.used[joint]] ** 2))
             found.append(power / whole if whole > 0.0 else 0.0)
         return found

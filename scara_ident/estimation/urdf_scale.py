@@ -11,6 +11,7 @@ import pinocchio as pin
 from scara_ident.estimation.estimate import Estimate
 from scara_ident.estimation.observations import Observations
 from scara_ident.model.regressor.kernel import configurations
+from scara_ident.model.terms import Friction
 from scara_ident.model.urdf_values import urdf_values
 from scara_ident.robot.robot import Robot
 
@@ -121,11 +122,29 @@ def slight_joints(estimate: Estimate, observations: Observations) -> tuple[str, 
 def told_scale(estimate: Estimate, observations: Observations) -> str:
     """Say how the scale of the identified bodies compares with the URDF's."""
     seen = estimate, observations
-    return scale_sentence(urdf_scale(*seen), observations.model.robot, unlike_urdf(*seen), slight_joints(*seen))
+    scales = urdf_scale(*seen)
+    return scale_sentence(
+        scales, observations.model.robot, unlike_urdf(*seen), slight_joints(*seen), braked_joints(estimate)
+    )
+
+
+def braked_joints(estimate: Estimate) -> tuple[str, ...]:
+    """Return the joints whose Coulomb friction surely brakes: there efforts have the sign of the positions."""
+    model, found = estimate.model, []
+    for term in model.terms:
+        if isinstance(term, Friction) and 0 in term.powers:
+            own = range(len(estimate.value))[model.place(term)][term.powers.index(0) :: len(term.powers)]
+            pairs = zip(model.robot.joints, own, strict=True)
+            found += [joint for joint, k in pairs if estimate.value[k] > SURE * estimate.std[k]]
+    return tuple(found)
 
 
 def scale_sentence(
-    scales: Mapping[str, float] | None, robot: Robot, unlike: Sequence[str] = (), slight: Sequence[str] = ()
+    scales: Mapping[str, float] | None,
+    robot: Robot,
+    unlike: Sequence[str] = (),
+    slight: Sequence[str] = (),
+    braked: Sequence[str] = (),
 ) -> str:
     """Say what scale recordings cannot tell, and how the URDF's compares, where scales are given.
 
@@ -138,8 +157,10 @@ def scale_sentence(
         See `unlike_urdf`.
     slight : sequence of str, optional
         See `slight_joints`: nothing is asked for their sake.
+    braked : sequence of str, optional
+        See `braked_joints`: a gain of the wrong sign is none of theirs.
     """
-    said = _compared(scales, robot, slight)
+    said = _compared(scales, robot, slight, braked)
     if not scales or not unlike:
         return said
     return f"{said} On {', '.join(unlike)} they are not the URDF's in any scale."
@@ -154,7 +175,9 @@ def gravity_acts(robot: Robot) -> bool:
     return bool(np.max(np.abs(torques)) > ROUNDING * bodies)
 
 
-def _compared(scales: Mapping[str, float] | None, robot: Robot, slight: Sequence[str]) -> str:
+def _compared(
+    scales: Mapping[str, float] | None, robot: Robot, slight: Sequence[str], braked: Sequence[str] = ()
+) -> str:
     geared = np.any(robot.reduction != 1.0)
     said = "No recording tells a scale common to all torques and masses"
     if gravity_acts(robot):
@@ -172,15 +195,18 @@ def _compared(scales: Mapping[str, float] | None, robot: Robot, slight: Sequence
     if little and not shared:
         others = {joint: scale for joint, scale in scales.items() if joint not in little}
         few = ", ".join(f"{scale:.2g} times the URDF's on {joint}" for joint, scale in little.items())
-        begun = f"{_compared(others, robot, ())} They" if others else f"{said}. Torques of the bodies"
+        begun = f"{_compared(others, robot, (), braked)} They" if others else f"{said}. Torques of the bodies"
         return f"{begun} are {few}, but so small there that a centre of mass a little off makes as much."
     size = np.array(list(scales.values()))
     turned = [joint for joint, scale in scales.items() if scale < 0.0]
     if turned:
-        return (
-            f"{said}. Torques of the bodies have the opposite sign of the URDF's on {', '.join(turned)}: negate effort_gain there, "
-            "or the axis, unless gravity has another direction."
-        )
+        said = f"{said}. Torques of the bodies have the opposite sign of the URDF's on {', '.join(turned)}"
+        if set(turned) <= set(braked):
+            return (
+                f"{said}, though friction brakes there, so that efforts have the sign of the positions: the centre of mass lies "
+                "elsewhere than in the URDF, or both count against the URDF's axis, or gravity has another direction."
+            )
+        return f"{said}: negate effort_gain there, or the axis, unless gravity has another direction."
     middle = float(np.exp(np.median(np.log(size))))
     usual = (size > 1.0 / USUAL) & (size < USUAL)
     if np.all(usual):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +33,8 @@ LEAST_SAMPLES = 4.0
 MOST_NAMES = 6
 # Motion above this frequency makes most arms swing, Hz.
 SWINGING = 5.0
+# Samples per second at which the torque of guessed rotors is looked at: an order of magnitude needs no more.
+PREVIEW_RATE = 100.0
 
 
 def file_names(design: Design, suffix: str) -> tuple[str, ...]:
@@ -269,11 +272,33 @@ def _foreseen(design: Design) -> str:
     model = design.model
     told = "Torques were foreseen with the URDF's bodies and rotors"
     if not np.any(np.delete(design.nominal, np.r_[model.place(model.rigid_body)])):
+        if lacking := _rotors_left_out(design):
+            told = f"Torques were foreseen with the URDF's bodies, without {lacking}"
         return f"{told}, without friction: identify once, and give what was found."
     own = scara03_friction(model.robot)
     if own and all(own[name] == value for name, value in zip(model.names, design.nominal, strict=True) if name in own):
         return f"{told} and the friction of the paper's Table 5 (OJD)."
     return f"{told}, or what was known better, and the friction that was given."
+
+
+def _rotors_left_out(design: Design) -> str:
+    """Name the rotors that nobody stated, and what as large ones as motors of their size have would make of a torque."""
+    model, robot = design.model, design.model.robot
+    guessed = np.where(robot.rotor_stated, 0.0, robot.rotor_guess.armature)
+    if not np.any(guessed):
+        return ""
+    body = model.rigid_body
+    added = (body.base.grouping @ np.concatenate([np.zeros(10 * robot.n), guessed]))[body.kept]
+    heavier = design.nominal.copy()
+    heavier[model.place(body)] += added
+    runs = [replace(design, nominal=heavier).motion(k, PREVIEW_RATE) for k in range(len(design.trajectories))]
+    peak = np.max([np.max(np.abs(run.torque), axis=1) for run in runs if run.torque is not None], axis=0)
+    worst = int(np.argmax(np.where(guessed > 0.0, peak / design.limits.torque, 0.0)))
+    joints = _few([joint for joint, own in zip(robot.joints, guessed, strict=True) if own > 0.0], "joint")
+    return (
+        f"the rotors of {joints}, which nobody stated (as large as motors of that size have, they would take {robot.joints[worst]} "
+        f"to some {peak[worst]:.2g} {robot.torque_unit(worst)} of {design.limits.torque[worst]:.2g})"
+    )
 
 
 def _harmonics(basis: Basis) -> int | list[int] | None:

@@ -18,8 +18,11 @@ from scara_ident.motion.position_noise import coarse_positions
 from scara_ident.motion.prepared import PreparedData, PreparedRecording, prepare
 from scara_ident.motion.velocity_audit import VelocityAudit, VelocityFault, audit_velocity, told_together
 from scara_ident.recording.recording import Recording
+from scara_ident.recording.shared_samples import copies_among
 from scara_ident.threads import side_by_side
 
+# A recording of which more was recorded before is a copy of that, whatever else it holds.
+MOSTLY = 0.5
 # An rms of so many independent values is known to 1 / sqrt(2 N), here 22 % (the standard error of a standard deviation).
 LEAST_ROWS = 10
 
@@ -63,9 +66,10 @@ def usable_in_bands(
     if not recordings:
         raise UsageError("no recordings to identify from")
     keep_freed()
+    recordings, copied = without_copies(recordings)
     data, useless = usable_data(recordings)
     held_out, more = usable_data(validation)
-    notes = [*useless, *more, *data_notes(data, held_out)]
+    notes = [*copied, *useless, *more, *data_notes(data, held_out)]
     if held:
         data, held_out, more = held_at_once(data, held_out)
         notes += more
@@ -92,6 +96,23 @@ def _bands_of(model: TorqueModel, data: PreparedData, *, alike: bool) -> tuple[B
         if not short:
             return choice, left, useless
         data, useless = left, [*useless, *short]
+
+
+def without_copies(recordings: Sequence[Recording]) -> tuple[list[Recording], list[str]]:
+    """Return recordings without copies of others among them, which would make parameters look surer than they are, and say which."""
+    copies, kept, notes = copies_among(recordings), [], []
+    for place, recording in enumerate(recordings):
+        if place not in copies:
+            kept.append(recording)
+            continue
+        first, share = copies[place]
+        said = f"{recording.path or recording.name}: {share:.0%} of its samples are those of {first.path or first.name}"
+        if share > MOSTLY:
+            notes.append(f"{said}; left out")
+        else:
+            notes.append(f"{said}, and count twice; give each once")
+            kept.append(recording)
+    return kept, notes
 
 
 def usable_data(recordings: Sequence[Recording]) -> tuple[PreparedData, list[str]]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.inspection.values import ALIKE, averages, slopes, time_unit
-from scara_ident.robot.units import ALSO, find_unit, table_of
+from scara_ident.robot.units import ALSO, find_unit, is_unit, table_of
 
 QUANTITIES = {
     "position": "position positions pos q jpos qpos angle angles ang theta encoder enc winkel drehwinkel lage",
@@ -90,6 +90,8 @@ class Meaning:
         Whether it says that the value was asked for, or sensed.
     template : str
         The name with the joint or number replaced by a placeholder: equal for the channels of one signal.
+    stem : str
+        The template without its unit: equal where joints that turn and joints that slide have units of their own.
     words : frozenset of str
         Its words in small letters.
     """
@@ -101,6 +103,7 @@ class Meaning:
     commanded: bool
     measured: bool
     template: str
+    stem: str
     words: frozenset[str]
 
 
@@ -150,6 +153,7 @@ def meaning(name: str, joints: Sequence[str] = ()) -> Meaning:
         commanded=bool(COMMANDED & set(spoken)),
         measured=bool(MEASURED & set(spoken)),
         template=template,
+        stem=_without_unit(template),
         words=frozenset(spoken),
     )
 
@@ -157,6 +161,14 @@ def meaning(name: str, joints: Sequence[str] = ()) -> Meaning:
 def _without_accents(text: str) -> str:
     """Return a text of the same length without accents."""
     return "".join(unicodedata.normalize("NFKD", letter)[0] for letter in text)
+
+
+def _without_unit(template: str) -> str:
+    bare = _BRACKETS.sub(lambda found: "" if is_unit(found[1]) else found[0], template).rstrip()
+    last = next(reversed(list(_TOKEN.finditer(bare))), None)
+    if bare != template or last is None or last.end() < len(bare) or last[0].lower() not in _ENDINGS:
+        return bare
+    return bare[: last.start()].rstrip("_ .-")
 
 
 def _parts(word: str) -> list[str]:
@@ -246,7 +258,8 @@ def nameless(names: Iterable[str]) -> bool:
 
 
 def _meaning(quantity: str, number: int | None) -> Meaning:
-    return Meaning(quantity, None, number, None, False, False, f"{quantity} {{number}}", frozenset())
+    template = f"{quantity} {{number}}"
+    return Meaning(quantity, None, number, None, False, False, template, template, frozenset())
 
 
 def _are_slopes(numbers: Mapping[str, Array], time: str, positions: Sequence[str], velocities: Sequence[str]) -> bool:

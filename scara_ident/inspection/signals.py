@@ -37,22 +37,38 @@ class Signal:
 def groups(quantity: str, meanings: Mapping[str, Meaning], joints: int) -> list[tuple[str, bool, dict[int, str]]]:
     """List the columns that may be one signal: their template, whether joints are told by name, and the columns.
 
-    What is told by name is told by number too: where columns count J0, J1 and joints j1, j2, names mislead.
+    What is told by name is told by number too: where columns count J0, J1 and joints j1, j2, names mislead. Columns that
+    differ in their units alone are one signal, unless a joint has two of them.
     """
     named: dict[str, dict[int, str]] = {}
     numbered: dict[str, dict[int, str]] = {}
+    stems: dict[str, str] = {}
     for name, said in meanings.items():
         if said.quantity != quantity or (said.joint is not None and said.joint >= joints):
             continue
         if said.joint is not None:
             named.setdefault(said.template, {})[said.joint] = name
         blind = said if said.joint is None else meaning(name)
+        stems |= {said.template: said.stem, blind.template: blind.stem}
         # An arm of one joint needs neither name nor number.
         if blind.number is not None or said.joint is None:
             numbered.setdefault(blind.template, {})[blind.number or 0] = name
-    return [(template, True, members) for template, members in named.items()] + [
-        (template, False, members) for template, members in numbered.items()
+    return [(template, True, members) for template, members in _over_units(named, stems).items()] + [
+        (template, False, members) for template, members in _over_units(numbered, stems).items()
     ]
+
+
+def _over_units(found: Mapping[str, dict[int, str]], stems: Mapping[str, str]) -> dict[str, dict[int, str]]:
+    """Join groups of other joints whose templates are the same but for the unit, under the first one's template."""
+    result: dict[str, dict[int, str]] = {}
+    first: dict[str, str] = {}
+    for template, members in found.items():
+        known = first.setdefault(stems[template], template)
+        if known != template and not result[known].keys() & members.keys():
+            result[known] |= members
+        else:
+            result[template] = dict(members)
+    return result
 
 
 def of_group(

@@ -24,8 +24,11 @@ from scara_ident.threads import side_by_side
 WHOLE = 0.1
 # Drawn by seed: fits, candidates and what is left all look at the same.
 _NOISIER: WeakKeyDictionary[PreparedData, dict[int, PreparedData]] = WeakKeyDictionary()
-# Of every joint of a stretch the step of its encoder, or else the standard deviation of its white noise.
+# Of every joint of a stretch the step in which its positions go, if any, and the standard deviation of its white noise.
 NoiseSizes = tuple[tuple[float | None, float], ...]
+# Where positions scatter by more than so many times what their steps round off, they have white noise beside these: a file
+# may hold a noisy position to many digits, and an uneven clock to few.
+BEYOND_STEPS = 2.0
 _SIZES: WeakKeyDictionary[PreparedData, tuple[tuple[NoiseSizes, ...], ...]] = WeakKeyDictionary()
 # Where steps fall anew is that of a position that has little left of them: with much left, the same ones would come
 # again. Whether it is the motion to less than a step matters not.
@@ -178,7 +181,7 @@ def noise_sizes(data: PreparedData) -> tuple[tuple[NoiseSizes, ...], ...]:
         def of_recording(item: PreparedRecording) -> tuple[NoiseSizes, ...]:
             steps = tuple(encoder_step(row) for row in item.recording.position)
             return tuple(
-                tuple((step, 0.0 if step else noise_level(part, joint)) for joint, step in enumerate(steps))
+                tuple((step, _white(noise_level(part, joint), step)) for joint, step in enumerate(steps))
                 for part in item.stretches
             )
 
@@ -186,11 +189,17 @@ def noise_sizes(data: PreparedData) -> tuple[tuple[NoiseSizes, ...], ...]:
     return _SIZES[data]
 
 
+def _white(level: float, step: float | None) -> float:
+    """Return the standard deviation of what scatters beside the rounding of steps."""
+    rounding = 0.0 if step is None else step / np.sqrt(12.0)
+    return float(np.sqrt(level**2 - rounding**2)) if level > BEYOND_STEPS * rounding else 0.0
+
+
 def noisier(data: PreparedData, seed: int = 0) -> PreparedData:
     """Return recordings with the noise of their positions once more on top.
 
     Where an encoder has steps, those of the same size about another zero are added, so that what follows the motion in
-    them does so again; else white noise of the size that the filter takes out.
+    them does so again; where it has none, or scatters by more, white noise of the size that the filter takes out.
 
     Parameters
     ----------
@@ -223,9 +232,9 @@ def _noisier(part: PreparedStretch, sizes: NoiseSizes, rng: np.random.Generator)
     stretch = part.stretch
     position = stretch.position.copy()
     for joint, (step, level) in enumerate(sizes):
-        if step is None:
+        if level > 0.0 or step is None:
             position[joint] += level * rng.standard_normal(position.shape[1])
-        else:
+        if step is not None:
             smooth = _smooth(part, joint, STEPLESS)[0] + step * rng.choice((UNLIKE, 1.0 - UNLIKE))
             position[joint] += step * np.round(smooth / step) - smooth
     return replace(stretch, position=position, _filtered={}, _thinned={})

@@ -11,6 +11,8 @@ from scara_ident.arrays import Array
 from scara_ident.recording.recording import Recording
 
 Hashes = NDArray[np.uint64]
+# Hashes, ascending, and the place of the recording that has each.
+Sketch = tuple[Hashes, NDArray[np.intp]]
 
 # Samples in a row that are compared as one. Two runs of one motion on coarse channels may agree in a sample or two.
 WINDOW = 32
@@ -24,6 +26,7 @@ LEAST_SHARE, FEWEST = 0.02, 3
 CHUNK = 65536
 _MIX = np.uint64(0x9E3779B97F4A7C15)
 _ODD = np.uint64(0xBF58476D1CE4E5B9)
+_EMPTY: Sketch = (np.zeros(0, dtype=np.uint64), np.zeros(0, dtype=np.intp))
 
 
 def shared_samples(
@@ -42,28 +45,62 @@ def shared_samples(
     """
     if not len(others):
         return
-    values, owners = np.zeros(0, dtype=np.uint64), np.zeros(0, dtype=np.intp)
+    sketch = _EMPTY
     for place, recording in enumerate(known):
-        for hashes in _windows(recording):
-            values = np.concatenate([values, hashes])
-            owners = np.concatenate([owners, np.full(len(hashes), place, dtype=np.intp)])
-            values, first = np.unique(values, return_index=True)
-            values, owners = values[:KEPT], owners[first][:KEPT]
+        sketch = _with_windows(sketch, recording, place)
+    for other in others:
+        found = _most_shared(sketch, other, known)
+        if found is not None:
+            yield other, *found
+
+
+def copies_among(recordings: Sequence[Recording]) -> dict[int, tuple[Recording, float]]:
+    """Find recordings that hold samples of ones before them, see `shared_samples`.
+
+    Returns
+    -------
+    dict of int to tuple
+        By the place of such a recording the one before it that it shares most with, and the share of its samples.
+    """
+    sketch, copies = _EMPTY, {}
+    for place, recording in enumerate(recordings):
+        found = _most_shared(sketch, recording, recordings)
+        if found is None:
+            sketch = _with_windows(sketch, recording, place)
+        else:
+            copies[place] = found
+    return copies
+
+
+def _with_windows(sketch: Sketch, recording: Recording, place: int) -> Sketch:
+    """Return the smallest hashes of all recordings so far and of one more, and the place of the first that has each."""
+    values, owners = sketch
+    for hashes in _windows(recording):
+        values = np.concatenate([values, hashes])
+        owners = np.concatenate([owners, np.full(len(hashes), place, dtype=np.intp)])
+        values, first = np.unique(values, return_index=True)
+        values, owners = values[:KEPT], owners[first][:KEPT]
+    return values, owners
+
+
+def _most_shared(sketch: Sketch, other: Recording, known: Sequence[Recording]) -> tuple[Recording, float] | None:
+    """Return the known recording with which another shares most and the share that is in any; None by accident."""
+    values, owners = sketch
     if not len(values):
-        return
+        return None
     # Below this bound every window of the known recordings is among those kept.
     bound = values[-1] if len(values) == KEPT else np.iinfo(np.uint64).max
-    for other in others:
-        seen, hits = 0, np.zeros(len(known), dtype=np.intp)
-        for hashes in _windows(other):
-            asked = hashes[hashes <= bound]
-            places = np.minimum(np.searchsorted(values, asked), len(values) - 1)
-            same = values[places] == asked
-            seen += len(asked)
-            hits += np.bincount(owners[places[same]], minlength=len(known))
-        total = int(hits.sum())
-        if total >= FEWEST and total >= LEAST_SHARE * seen:
-            yield other, known[int(np.argmax(hits))], total / seen
+    seen, hits = 0, np.zeros(len(known), dtype=np.intp)
+    for hashes in _windows(other):
+        asked = hashes[hashes <= bound]
+        places = np.minimum(np.searchsorted(values, asked), len(values) - 1)
+        same = values[places] == asked
+        seen += len(asked)
+        hits += np.bincount(owners[places[same]], minlength=len(known))
+    total = int(hits.sum())
+    if total < FEWEST or total < LEAST_SHARE * seen:
+        return None
+    return known[int(np.argmax(hits))], total / seen
 
 
 def _windows(recording: Recording) -> Iterator[Hashes]:

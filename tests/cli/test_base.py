@@ -35,6 +35,15 @@ def test_an_angle_with_few_digits_is_said(command, tmp_path: Path):
     assert "an angle in the URDF may have few digits" in " ".join(result.out.split())
 
 
+def test_base_parameters_that_no_motion_tells_apart_are_said(command):
+    """A rank of 40 of 42 was printed as if it were right."""
+    result = command("base", "--robot", "so101")
+    assert result.status == 0
+    said = " ".join(result.out.split())
+    assert "check: rank 40 of 42" in said
+    assert "2 of the base parameters hardly differ from sums of others" in said
+
+
 def test_a_robot_that_is_not_there_is_status_2_and_a_bad_one_1(command, tmp_path: Path):
     result = command("base", "--robot", tmp_path / "robot.yaml")
     assert result.status == 2

@@ -57,6 +57,18 @@ def test_the_share_of_noise_is_that_of_white_steps():
     assert noise_shares(data)[0] == pytest.approx(expected, rel=0.3)
 
 
+def test_what_scatters_over_the_steps_is_counted_too():
+    """Positions of 16 bits with a noise of five steps: the bias that it makes was not seen, and no part of a std."""
+    step, rng = 2.0 * np.pi / 2**16, np.random.default_rng(5)
+    noisy = [
+        replace(run, position=step * np.round(run.position / step + 5.0 * rng.standard_normal(run.position.shape)))
+        for run in exact_runs()
+    ]
+    estimate, exact = wls(observed(noisy, WIDE)), wls(observed(exact_runs(), WIDE)).value
+    assert estimate.noise_bias is not None
+    assert estimate.noise_bias[0] == pytest.approx(estimate.value[0] - exact[0], rel=0.3)
+
+
 def test_the_torque_that_the_noise_makes_is_that_of_the_steps():
     fine, rough = observed(exact_runs(), WIDE), observed(coarse(13), WIDE)
     value = wls(fine).value

@@ -11,6 +11,7 @@ import pytest
 from scara_ident.estimation import wls
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.estimation.urdf_scale import (
+    braked_joints,
     gravity_acts,
     scale_sentence,
     slight_joints,
@@ -59,6 +60,23 @@ def test_opposite_signs_are_said_first(arm):
     assert list(found.values()) == pytest.approx((-1.0, -1.0), rel=0.02)
     assert "the opposite sign of the URDF's on j1, j2: negate effort_gain there" in scale_sentence(found, robot)
     assert "the opposite sign of the URDF's on j2: negate" in scale_sentence({"j1": 30.0, "j2": -1.0}, robot)
+
+
+def test_where_friction_brakes_no_gain_of_opposite_sign_is_suspected(tmp_path):
+    """The centre of mass of the last link lay on the other side: the joint's effort, which was right, was to be negated."""
+    robot = load_robot(write_urdf(tmp_path / "arm.urdf", PLANAR_2R))
+    run = noisy(swing(robot, seconds=8.0, rate=200.0), np.random.default_rng(1), 0.05)
+    model = build_model(robot, "basic")
+    rate = np.gradient(run.position, run.time, axis=1)
+    braked = replace(run, effort=-run.effort + 2.0 * np.sign(rate))
+    observations = observe(model, prepare([braked], (8.0, 8.0)))
+    estimate = wls(observations)
+    assert braked_joints(estimate) == robot.joints
+    said = told_scale(estimate, observations)
+    assert "the opposite sign of the URDF's on j1, j2, though friction brakes there" in said
+    assert "negate" not in said
+    pushed = observe(model, prepare([replace(run, effort=-run.effort - 2.0 * np.sign(rate))], (8.0, 8.0)))
+    assert "on j1, j2: negate effort_gain there" in told_scale(wls(pushed), pushed)
 
 
 def test_joints_that_differ_are_named(arm):

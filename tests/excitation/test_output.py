@@ -1,4 +1,5 @@
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -60,6 +61,22 @@ def test_ros_2_gets_points_enough_for_a_fast_motion(made):
     fast = replace(made.trajectories[0], basis=make_basis(0.25, 6))
     points = yaml.safe_load(joint_trajectory_yaml(fast))["points"]
     assert len(points) == 0.25 * 240 + 1
+
+
+def test_rotors_that_nobody_stated_are_named_with_what_they_would_make_of_a_torque():
+    """They are most of what a geared joint moves: limits were said to hold with a third of the torque that was then asked for."""
+    model = build_model(load_robot("ur5"), "basic")
+    effort = Effort(starts=1, rounds=0, processes=1)
+    made = design_excitation(model, duration=4.0, harmonics=3, samples=200, effort=effort)
+    (said,) = (line for line in notes(made) if line.startswith("Torques"))
+    assert "without the rotors of shoulder_pan_joint, " in said
+    worst = re.search(r"they would take (\w+) to some (\S+) N m of (\S+)\), without friction", said)
+    assert worst is not None
+    joint = model.robot.joint_index(worst[1])
+    motion = made.motion(rate=100.0)
+    body = model.robot.rotor_guess.armature[joint] * motion.a[joint]
+    assert float(worst[2]) == pytest.approx(np.max(np.abs(motion.torque[joint] + body)), rel=0.06)
+    assert float(worst[3]) == pytest.approx(made.limits.torque[joint], rel=0.01)
 
 
 def test_a_fast_motion_is_noted(made):

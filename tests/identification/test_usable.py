@@ -12,7 +12,7 @@ from scara_ident.errors import RecordingError
 from scara_ident.estimation.observations import kept_rows, observe
 from scara_ident.identification.compare import compare
 from scara_ident.identification.identify import identify, known_information
-from scara_ident.identification.usable import check_rows, data_notes, usable_data, with_rows
+from scara_ident.identification.usable import check_rows, data_notes, usable_data, with_rows, without_copies
 from scara_ident.model.model import build_model
 from scara_ident.motion.prepared import prepare
 from scara_ident.recording.recording import Recording
@@ -186,3 +186,29 @@ def test_velocities_that_lag_by_about_as_much_are_one_line(robot: Robot):
     assert items[0].velocity is not None
     alone = replace(items[0], velocity=np.array([items[0].velocity[0], np.gradient(items[0].position[1], 1.0 / RATE)]))
     assert len(velocity_notes([alone, *items[1:]])) == 2
+
+
+def test_a_recording_given_twice_counts_once(robot: Robot):
+    """A copy made every standard deviation smaller by the root of two, and nothing said so."""
+    first, second = moving(robot, "A_1", 1), moving(robot, "B_1", 2)
+    copy = replace(first, name="A_2")
+    once, twice = (
+        identify(robot, given, bands=(20.0, 20.0)) for given in ([first, second], [first, second, copy, first])
+    )
+    np.testing.assert_array_equal(twice.estimate.value, once.estimate.value)
+    np.testing.assert_array_equal(twice.estimate.std, once.estimate.std)
+    assert "A_2: 100% of its samples are those of A_1; left out" in twice.notes
+    assert [item.name for item in twice.training.data.recordings] == ["A_1", "B_1"]
+
+
+def test_a_recording_that_holds_some_of_another_is_only_named(robot: Robot):
+    first, second = moving(robot, "A_1", 1), moving(robot, "B_1", 2)
+    both = {
+        name: np.concatenate([getattr(second, name), getattr(first, name)[:, :600]], axis=1)
+        for name in ("position", "effort")
+    }
+    longer = replace(second, time=np.arange(both["position"].shape[1]) / RATE, **both)
+    kept, notes = without_copies([first, longer])
+    assert kept == [first, longer]
+    # Of 3000 windows those over the seam are nobody's.
+    assert notes == ["B_1: 19% of its samples are those of A_1, and count twice; give each once"]

@@ -113,3 +113,17 @@ def test_other_numbers_of_columns_say_nothing():
 def test_the_clock_of_a_group_is_no_position(name: str):
     assert meaning(name).quantity == "time"
     assert meaning(name.replace("ime", "orque")).quantity != "time"
+
+
+@pytest.mark.parametrize(
+    ("name", "stem"),
+    [
+        ("elbow position [mm]", "{joint} position"),
+        ("elbow_pos_deg", "{joint}_pos"),
+        ("q3 (rad)", "q{number}"),
+        ("elbow position [filtered]", "{joint} position [filtered]"),
+        ("elbow", "{joint}"),
+    ],
+)
+def test_the_stem_of_a_name_is_without_its_unit(name: str, stem: str):
+    assert meaning(name, ["shoulder", "elbow"]).stem == stem

@@ -27,3 +27,19 @@ def test_a_group_with_fewer_channels_than_joints_is_no_signal():
     signal, note = of_group("position", "enc[{number}]", False, {0: "enc[0]"}, ROBOT)
     assert signal is None
     assert "1 channels for 2 joints" in note
+
+
+def test_columns_that_differ_in_their_units_alone_are_one_signal():
+    """An arm that slides and turns is logged in mm and in degrees: joints of the other unit were locked."""
+    names = ["joint1 pos [mm]", "joint2 pos [°]", "q0_mm", "q1_deg"]
+    assert groups("position", {name: meaning(name, ROBOT.joints) for name in names}, ROBOT.n) == [
+        ("{joint} pos [mm]", True, {0: "joint1 pos [mm]", 1: "joint2 pos [°]"}),
+        ("joint{number} pos [mm]", False, {1: "joint1 pos [mm]", 2: "joint2 pos [°]"}),
+        ("q{number}_mm", False, {0: "q0_mm", 1: "q1_deg"}),
+    ]
+
+
+def test_one_joint_in_two_units_is_two_signals():
+    names = ["joint1 pos [rad]", "joint2 pos [rad]", "joint1 pos [°]", "joint2 pos [°]"]
+    found = groups("position", {name: meaning(name, ROBOT.joints) for name in names}, ROBOT.n)
+    assert [template for template, by_name, _ in found if by_name] == ["{joint} pos [rad]", "{joint} pos [°]"]

@@ -16,6 +16,7 @@ from scara_ident.motion.position_noise import (
     encoder_step,
     forget_noisier,
     noise_level,
+    noise_sizes,
     noisier,
     unresolved_joints,
 )
@@ -79,6 +80,21 @@ def test_steps_are_added_about_another_zero_and_follow_the_motion():
     assert abs(np.corrcoef(added[0], part.stretch.position[0] - SMOOTH[0])[0, 1]) < 0.2
     again = noisier(replace(data), seed=3).stretches[0].stretch.position
     assert np.array_equal(again, more.stretch.position)
+
+
+@pytest.mark.parametrize(("counts", "white"), [(0.0, False), (0.2, False), (1.5, True), (4.0, True)])
+def test_an_encoder_that_scatters_over_its_steps_has_white_noise_beside_them(counts: float, white: bool):
+    """A resolver of some counts of noise: the rounding of its steps was all the noise it was believed to have."""
+    step = 2.0 * np.pi / 2**16
+    rng = np.random.default_rng(2)
+    data = prepared(step * np.round(SMOOTH / step + counts * rng.standard_normal(SMOOTH.shape)))
+    ((sizes,),) = noise_sizes(data)
+    # Noise of a step and more leaves nothing of the rounding but its variance.
+    expected = counts * step if white else 0.0
+    assert sizes == ((pytest.approx(step), pytest.approx(expected, rel=0.1)),) * 2
+    (more,) = noisier(data).stretches
+    added = np.std(more.stretch.position - data.stretches[0].stretch.position, axis=1)
+    assert added == pytest.approx([np.hypot(expected, step / np.sqrt(12.0))] * 2, rel=0.15)
 
 
 @pytest.mark.parametrize("band", [None, 0.13])

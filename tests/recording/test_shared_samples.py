@@ -9,7 +9,7 @@ import pytest
 
 from scara_ident.recording import shared_samples as module
 from scara_ident.recording.recording import Recording
-from scara_ident.recording.shared_samples import shared_samples
+from scara_ident.recording.shared_samples import copies_among, shared_samples
 from tests.made_recordings import columns
 
 
@@ -71,3 +71,11 @@ def test_repetitions_on_coarse_channels_and_arms_at_rest_are_no_copies():
     assert list(shared_samples([still], [replace(still)])) == []
     assert list(shared_samples([], [FIRST])) == []
     assert list(shared_samples([FIRST], [part(FIRST, slice(0, 20))])) == []
+
+
+def test_copies_among_recordings_are_those_behind_the_first():
+    cut = part(SECOND, slice(200, 1500))
+    found = copies_among([FIRST, SECOND, FIRST, OTHER, cut])
+    assert found == {2: (FIRST, pytest.approx(1.0)), 4: (SECOND, pytest.approx(1.0))}
+    assert copies_among([FIRST, SECOND, OTHER]) == {}
+    assert copies_among([]) == {}

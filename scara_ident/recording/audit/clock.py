@@ -31,6 +31,10 @@ REPEATED_SHARE = 0.05
 LATE, STEADY, NEAR = 1.5, 0.1, 0.1
 # Below this, taking the interval as constant misplaces a position by less than a thirtieth of what it travels a sample.
 JITTER = 0.03
+# Stamps of an uneven clock that are rounded to this share of the interval misplace the positions by more than most encoders.
+COARSE = 0.02
+# Finer than a microsecond, stamps that count from 1970 hold rounding alone.
+FINEST = 1e-6
 
 
 def enough(samples: Samples) -> Checked:
@@ -131,13 +135,17 @@ def sampling(samples: Samples) -> Checked:
     jitter = float(np.std(usual)) / median
     found = []
     if jitter > JITTER:
-        found.append(
-            Finding(
-                "jitter",
-                f"sampling interval varies by {100 * jitter:.2g} % (std), {1e3 * usual.min():.3g} to "
-                f"{1e3 * usual.max():.3g} ms about {1e3 * median:.3g} ms: the time stamps are used",
-            )
+        said = (
+            f"sampling interval varies by {100 * jitter:.2g} % (std), {1e3 * usual.min():.3g} to "
+            f"{1e3 * usual.max():.3g} ms about {1e3 * median:.3g} ms: the time stamps are used"
         )
+        rounded = FINEST * float(np.gcd.reduce(np.rint(np.diff(samples.time) / FINEST).astype(np.int64)))
+        if rounded > COARSE * median:
+            said += (
+                f"; they are rounded to {1e3 * rounded:.3g} ms, which is noise of the positions in motion: record time with "
+                "more digits"
+            )
+        found.append(Finding("jitter", said))
     if lost.any():
         count = int(np.sum(np.rint(step[lost] / median) - 1))
         first = samples.where(int(np.argmax(lost)) + 1)

@@ -152,6 +152,20 @@ def test_jitter_is_said_with_its_size(read):
     finding = only(read(columns(time=time)), "jitter")
     # The difference of two uniform deviates of half-width 0.2 has a standard deviation of 0.2 sqrt(2/3).
     assert "varies by 16 %" in finding.message
+    assert finding.message.endswith("the time stamps are used")
+
+
+@pytest.mark.parametrize(("digits", "rounded"), [(4, "0.1 ms"), (5, None)])
+def test_stamps_that_are_rounded_are_said_to_be(read, digits, rounded):
+    """The way of a joint within a stamp's last digit is noise of its positions."""
+    time = 1.7e9 + 2e-3 * (np.arange(4000) + np.random.default_rng(1).uniform(-0.2, 0.2, 4000))
+    said = only(read(columns(time=np.round(time, digits))), "jitter").message
+    if rounded is None:
+        assert said.endswith("are used")
+    else:
+        assert said.endswith(
+            f"they are rounded to {rounded}, which is noise of the positions in motion: record time with more digits"
+        )
 
 
 def test_the_jitter_of_a_steady_clock_is_not_worth_a_line(read):
