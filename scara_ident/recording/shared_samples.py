@@ -24,6 +24,8 @@ KEPT = 65536
 LEAST_SHARE, FEWEST = 0.02, 3
 # Samples at a time.
 CHUNK = 65536
+# Of single samples of one joint one in 2 to the power of this is looked at to tell whether recordings may share any samples.
+SPARSE_BITS = 4
 _MIX = np.uint64(0x9E3779B97F4A7C15)
 _ODD = np.uint64(0xBF58476D1CE4E5B9)
 _EMPTY: Sketch = (np.zeros(0, dtype=np.uint64), np.zeros(0, dtype=np.intp))
@@ -63,13 +65,36 @@ def copies_among(recordings: Sequence[Recording]) -> dict[int, tuple[Recording, 
         By the place of such a recording the one before it that it shares most with, and the share of its samples.
     """
     sketch, copies = _EMPTY, {}
-    for place, recording in enumerate(recordings):
+    for place in _may_share(recordings):
+        recording = recordings[place]
         found = _most_shared(sketch, recording, recordings)
         if found is None:
             sketch = _with_windows(sketch, recording, place)
         else:
             copies[place] = found
     return copies
+
+
+def _may_share(recordings: Sequence[Recording]) -> list[int]:
+    """Return the places of recordings that have some single samples of the first joint in common with others.
+
+    To hash all windows of all recordings takes a fifth as long as to identify from them.
+    """
+    few = [_few(recording) for recording in recordings]
+    if not few:
+        return []
+    values, counts = np.unique(np.concatenate(few), return_counts=True)
+    common = values[counts > 1]
+    shared = [np.count_nonzero(np.isin(own, common, assume_unique=True)) for own in few]
+    return [k for k, own in enumerate(few) if shared[k] > 0.5 * LEAST_SHARE * len(own)]
+
+
+def _few(recording: Recording) -> Hashes:
+    """Return different hashes of the first joint's samples, of one in so many, which are told by the bits of their positions."""
+    position = recording.position[0] + 0.0
+    asked = (position.view(np.uint64) * _ODD) >> np.uint64(64 - SPARSE_BITS) == 0
+    signals = [recording.position] if recording.effort is None else [recording.position, recording.effort]
+    return np.unique(_samples([signal[:1, asked] for signal in signals]))
 
 
 def _with_windows(sketch: Sketch, recording: Recording, place: int) -> Sketch:
