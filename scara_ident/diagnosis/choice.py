@@ -13,7 +13,7 @@ from scara_ident.diagnosis.correction import taken_out
 from scara_ident.diagnosis.criteria import SelectionCriteria
 from scara_ident.diagnosis.effect_parameters import parameters_beside, told_size
 from scara_ident.diagnosis.noise_check import noise_objection
-from scara_ident.diagnosis.nonlinear_fit import tune
+from scara_ident.diagnosis.nonlinear_fit import freed_model, tune
 from scara_ident.diagnosis.remainder_check import remainder_objection
 from scara_ident.diagnosis.selection_step import SelectionStep, best_of_each, points_of_lines
 from scara_ident.diagnosis.setpoints import setpoint_objection
@@ -47,7 +47,10 @@ def choose(
     best = [item for family in by_family.values() for item in best_of_each(family).values()]
     first = [item for item in decisions if item.candidate.effect.fitted_first]
     accepted = [item for item in best if item.accepted and not item.candidate.effect.fitted_first]
-    found = fitted_beside(step, first, max((item.gain for item in accepted), default=0.0), known)
+    beside = [item for item in first if item.candidate.effect.together and step.scene.together]
+    best_gain = max((item.gain for item in accepted), default=0.0)
+    found = fitted_beside(step, [item for item in first if item not in beside], best_gain, known)
+    found += _each_fitted(step, _promising(step, beside), beside, known)
     fitted = {item.label for _, item in found}
     refused = {item.label: item for _, item in found if not item.accepted}
     accepted += _sure_once_refined(step, best, max((item.examination.held_out for item in accepted), default=0.0))
@@ -85,6 +88,10 @@ def _soundest(
         pairs = [(step, item) for item in refined if item.accepted] + [pair for pair in leaders if pair[0] is not step]
         for own, decision in best_first(pairs):
             why = objection(own, decision)
+            if why is not None and decision.candidate.effect.together and own.scene.together:
+                # Beside others that it acts with a coarse fit ends early: what they took up of it goes back to it slowly.
+                own, decision = fitted_with(own, decision.candidate)
+                why = objection(own, decision) if decision.accepted else decision.why
             if why is None:
                 return own, decision
             refused[decision.label] = decision.refused(why)
@@ -133,7 +140,14 @@ def fitted_beside(
     """
     criteria = step.criteria
     enough = max(criteria.least_gain, criteria.near_best * best)
-    worth = _worth_fitting(candidates, enough, step.tried, criteria)
+    return _each_fitted(step, _worth_fitting(candidates, enough, step.tried, criteria), candidates, known)
+
+
+def _each_fitted(
+    step: SelectionStep, worth: Sequence[Decision], candidates: Sequence[Decision], known: SelectionStep | None
+) -> list[tuple[SelectionStep, Decision]]:
+    """Return what `fitted_beside` does of those of the candidates that are worth it."""
+    criteria = step.criteria
     begins = {item.label: (step.scene, item.candidate) for item in worth}
     if known is not None:
         # Found in another band: from there it is near.
@@ -204,6 +218,20 @@ def _worth_fitting(
     large = {item.candidate.effect.name for item in best if item.gain >= enough}
     best.sort(key=lambda item: -item.gain)
     return [item for item in best if item.candidate.effect.name in large][: criteria.most_fitted]
+
+
+def _promising(step: SelectionStep, points: Sequence[Decision]) -> list[Decision]:
+    """Return the best points, more than chance would bring, of those that act together with effects in the model.
+
+    These were fitted as if there were no others: what a candidate would add is seen once they may give way. How much that is
+    the fit says.
+    """
+    if not points:
+        return []
+    judged = step.judge([item.candidate for item in points], model=freed_model(step))
+    sure = [item for item in judged if more_than_chance(item, step.tried, step.criteria)]
+    best = sorted(best_of_each(sure).values(), key=lambda item: -item.gain)
+    return best[: step.criteria.most_fitted]
 
 
 def _left_again(step: SelectionStep, decision: Decision) -> str | None:

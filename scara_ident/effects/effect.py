@@ -68,6 +68,9 @@ class Effect(ABC):
         and are made again to be tried beside it.
     fitted_first : bool
         Whether it is judged at the estimate fitted with it only: its columns at the estimate without it are poor ones.
+    together : bool
+        Whether what its members do follows from those of other joints in the model too, `Scene.together`: the columns of members
+        that are in it add up to what all of them do, those of another are what it changes beside them.
     by_recording, in_intervals : bool
         Whether it acts in some recordings and not in others, see `in_recordings`, or in intervals that its member holds.
     same_at_all_frequencies : bool
@@ -99,6 +102,7 @@ class Effect(ABC):
     on_links: ClassVar[bool] = False
     of_load: ClassVar[bool] = False
     fitted_first: ClassVar[bool] = False
+    together: ClassVar[bool] = False
     by_recording: ClassVar[bool] = False
     in_intervals: ClassVar[bool] = False
     same_at_all_frequencies: ClassVar[bool] = False

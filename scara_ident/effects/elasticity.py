@@ -77,6 +77,7 @@ class JointElasticity(BehindGear):
         NonlinearParameter("_damping_ratio", "1", LOWEST_DAMPING, HIGHEST_DAMPING),
     )
     fitted_first = True
+    together = True
     view = View("acceleration")
     experiment = "excite above 5 Hz with short steps, and look for a resonance that stays at its frequency"
 
@@ -96,9 +97,23 @@ class JointElasticity(BehindGear):
         return super().words(scene, member) | {"compliance": unit}
 
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
-        """Return the change of torque per compliance."""
-        masses = TwoMasses(signals, member.place, *member.nonlinear)
-        return [masses.stiffness * masses.change if masses.inertia > 0.0 else np.zeros_like(signals.motion.q)]
+        """Return the change of torque per compliance, of a member that is not in the model beside those that are."""
+        if not usual_link_inertia(signals.scene, member.place) > 0.0:
+            return [np.zeros_like(signals.motion.q)]
+        members = self._swinging(signals.scene, member)
+        masses = TwoMasses(signals, members)
+        stiffness = masses.stiffness[members.index(member)]
+        if (self, member) in signals.scene.together:
+            return [stiffness * masses.parts[members.index(member)]]
+        others = tuple(item for item in members if item is not member)
+        without = TwoMasses(signals, others).change if others else 0.0
+        return [stiffness * (masses.change - without)]
+
+    def _swinging(self, scene: Scene, member: Member) -> tuple[Member, ...]:
+        """Return a member and those of other joints in the model, in the order of joints."""
+        others = [item for effect, item in scene.together if effect == self and item.place != member.place]
+        moving = [item for item in others if usual_link_inertia(scene, item.place) > 0.0]
+        return tuple(sorted([*moving, member], key=lambda item: item.place))
 
     def tie(self, scene: Scene, member: Member) -> Tie | None:
         """Return the compliance that goes with the frequency."""
@@ -110,8 +125,9 @@ class JointElasticity(BehindGear):
         return Tie(compliance, -compliance * np.append(bodies / inertia, [2.0 / member.nonlinear[0], 0.0]))
 
     def slopes(self, signals: Signals, member: Member) -> Iterable[tuple[NDArray[np.intp], Array]]:
-        """Give the derivatives with the compliance as it is."""
-        return TwoMasses(signals, member.place, *member.nonlinear).slopes()
+        """Give the derivatives of what all members in the model do, with the compliances as they are."""
+        members = self._swinging(signals.scene, member)
+        return TwoMasses(signals, members).slopes(members.index(member))
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """Say so where a spring does not pull back, would swing slower than is seen, or does not swing at all."""

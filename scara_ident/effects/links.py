@@ -292,50 +292,58 @@ def lagging(signals: Signals, joint: int, lag: tuple[Array, Array, Array]) -> Ar
     """
     by_q, by_v, by_a = (slope[:, : len(lag[0])] for slope in link_slopes(signals, joint))
     result = -(by_q * lag[0] + by_v * lag[1] + by_a * lag[2])
-    result[joint] = own_lagging(signals, joint, lag)
+    result[joint] = lagging_at(signals, joint, joint, lag)
     return np.asarray(result)
 
 
 def lagging_slopes(
-    signals: Signals, joint: int, bodies: Sequence[Array], acting: NDArray[np.intp], lags: tuple[Array, Array, Array]
+    signals: Signals,
+    joints: Sequence[int],
+    bodies: Sequence[Array],
+    acting: NDArray[np.intp],
+    lags: Sequence[tuple[Array, Array, Array]],
 ) -> Iterator[tuple[NDArray[np.intp], Array]]:
-    """Give of each joint the derivatives of the torque that a lag changes by parameters, those first that are the rigid bodies'.
+    """Give of each joint the derivatives of the torque that lags change by parameters, those first that are the rigid bodies'.
 
     Parameters
     ----------
-    joint : int
-        That whose link lags.
+    joints : sequence of int
+        Those whose links lag.
     bodies : sequence of ndarray, shape (k, N)
-        Of each joint the rigid bodies' columns that act on it, at the motion of the links.
+        Of each joint the rigid bodies' columns that act on it, at the motion of the links; none where derivatives by these
+        parameters are of no account.
     acting : ndarray of int, shape (m,)
-        Parameters that the lag depends on.
-    lags : tuple of ndarray, shape (m, N)
-        Derivatives of the lag by these, and of its first two derivatives.
+        Parameters that the lags depend on.
+    lags : sequence of tuple of ndarray, shape (m, N)
+        Of each of these joints the derivatives of the lag by these, and of its first two derivatives.
 
     Yields
     ------
     tuple of (ndarray of int, shape (l,), ndarray, shape (l, N))
         The parameters in their order, and their derivatives; of all others they are zero.
     """
-    scene, slopes = signals.scene, link_slopes(signals, joint)
-    for j, (moved, recorded) in enumerate(zip(bodies, rigid_rows(signals), strict=True)):
-        own = np.flatnonzero(scene.model.rigid_body.pattern[j])
-        places, count = np.union1d(own, acting), moved.shape[1]
-        rotor = scene.robot.row_scale[j] * scene.armature(j) if j == joint else 0.0
-        by_q, by_v, by_a = slopes[0][j], slopes[1][j], slopes[2][j] - rotor
+    scene, count = signals.scene, signals.motion.samples
+    slopes = [link_slopes(signals, joint) for joint in joints]
+    for j in range(scene.robot.n):
+        own = np.flatnonzero(scene.model.rigid_body.pattern[j]) if bodies else np.zeros(0, dtype=np.intp)
+        places = np.union1d(own, acting)
         at, result = np.searchsorted(places, acting), np.zeros((len(places), count))
-        for start in range(0, count, CHUNK):
-            some = slice(start, start + CHUNK)
-            x, first, second = (part[:, some] for part in lags)
-            result[at, some] = -(by_q[some] * x + by_v[some] * first + by_a[some] * second)
-        result[np.searchsorted(places, own)] += moved - recorded
+        for joint, (by_q, by_v, by_a), lag in zip(joints, slopes, lags, strict=True):
+            rotor = scene.robot.row_scale[j] * scene.armature(j) if j == joint else 0.0
+            along = by_a[j] - rotor
+            for start in range(0, count, CHUNK):
+                some = slice(start, start + CHUNK)
+                x, first, second = (part[:, some] for part in lag)
+                result[at, some] -= by_q[j, some] * x + by_v[j, some] * first + along[some] * second
+        if bodies:
+            result[np.searchsorted(places, own)] += bodies[j] - rigid_rows(signals)[j]
         yield places, result
 
 
-def own_lagging(signals: Signals, joint: int, lag: tuple[Array, Array, Array]) -> Array:
-    """Return what `lagging` changes at the lagging joint itself, of one lag (N,) or of several (..., N)."""
-    by_q, by_v, by_a = (slope[joint, : lag[0].shape[-1]] for slope in link_slopes(signals, joint))
-    rotor = signals.scene.robot.row_scale[joint] * signals.scene.armature(joint)
+def lagging_at(signals: Signals, place: int, joint: int, lag: tuple[Array, Array, Array]) -> Array:
+    """Return what `lagging` changes at the joint of a place, of one lag (N,) of another or the same joint or of several (..., N)."""
+    by_q, by_v, by_a = (slope[place, : lag[0].shape[-1]] for slope in link_slopes(signals, joint))
+    rotor = signals.scene.robot.row_scale[joint] * signals.scene.armature(joint) if place == joint else 0.0
     return np.asarray(rotor * lag[2] - (by_q * lag[0] + by_v * lag[1] + by_a * lag[2]))
 
 
