@@ -115,8 +115,8 @@ class SelectionStep:
         """Return the columns that candidates have at another scene, or at this one where effects found make others of them."""
         acting = {j for item in self.scene.link_torques for j in item.effect.rows(self.scene, item.member)}
         loaded = [
-            item.effect.of_load and item.effect.geared_joint(item.member) in acting
-            or item.effect.together and bool(self.scene.together)
+            (item.effect.of_load and item.effect.geared_joint(item.member) in acting)
+            or (item.effect.together and bool(self.scene.together))
             for item in candidates
         ]
         found: list[Rows | None] = [None] * len(candidates)

@@ -276,7 +276,7 @@ def behind(motion: Motion, joint: int, lag: tuple[Array, Array, Array]) -> Motio
 
 
 def lagging(signals: Signals, joint: int, lag: tuple[Array, Array, Array]) -> Array:
-    """Change of all torques when the link of one joint lags its motor, to first order in the lag.
+    """Return the change of all torques (n, N), recorded side, when the link of one joint lags its motor, to first order in the lag.
 
     The motor, whose rotor is not part of what lags, moves as recorded.
 
@@ -284,16 +284,8 @@ def lagging(signals: Signals, joint: int, lag: tuple[Array, Array, Array]) -> Ar
     ----------
     lag : tuple of ndarray (N,)
         Motor's position less the link's, at the joint, with its first two derivatives; may be of the first samples alone.
-
-    Returns
-    -------
-    ndarray, shape (n, N)
-        Recorded side.
     """
-    by_q, by_v, by_a = (slope[:, : len(lag[0])] for slope in link_slopes(signals, joint))
-    result = -(by_q * lag[0] + by_v * lag[1] + by_a * lag[2])
-    result[joint] = lagging_at(signals, joint, joint, lag)
-    return np.asarray(result)
+    return np.array([lagging_at(signals, place, joint, lag) for place in range(signals.scene.robot.n)])
 
 
 def lagging_slopes(
@@ -310,12 +302,11 @@ def lagging_slopes(
     joints : sequence of int
         Those whose links lag.
     bodies : sequence of ndarray, shape (k, N)
-        Of each joint the rigid bodies' columns that act on it, at the motion of the links; none where derivatives by these
-        parameters are of no account.
+        Of each joint the rigid bodies' columns that act on it, at the motion of the links; none where these do not vary.
     acting : ndarray of int, shape (m,)
         Parameters that the lags depend on.
     lags : sequence of tuple of ndarray, shape (m, N)
-        Of each of these joints the derivatives of the lag by these, and of its first two derivatives.
+        Of each lagging joint the derivatives of the lag by these, and of its first two derivatives.
 
     Yields
     ------
@@ -329,8 +320,7 @@ def lagging_slopes(
         places = np.union1d(own, acting)
         at, result = np.searchsorted(places, acting), np.zeros((len(places), count))
         for joint, (by_q, by_v, by_a), lag in zip(joints, slopes, lags, strict=True):
-            rotor = scene.robot.row_scale[j] * scene.armature(j) if j == joint else 0.0
-            along = by_a[j] - rotor
+            along = by_a[j] - (scene.robot.row_scale[j] * scene.armature(j) if j == joint else 0.0)
             for start in range(0, count, CHUNK):
                 some = slice(start, start + CHUNK)
                 x, first, second = (part[:, some] for part in lag)
@@ -341,7 +331,7 @@ def lagging_slopes(
 
 
 def lagging_at(signals: Signals, place: int, joint: int, lag: tuple[Array, Array, Array]) -> Array:
-    """Return what `lagging` changes at the joint of a place, of one lag (N,) of another or the same joint or of several (..., N)."""
+    """Return what `lagging` changes at the joint of a place, of one lag (N,) or of several (..., N)."""
     by_q, by_v, by_a = (slope[place, : lag[0].shape[-1]] for slope in link_slopes(signals, joint))
     rotor = signals.scene.robot.row_scale[joint] * signals.scene.armature(joint) if place == joint else 0.0
     return np.asarray(rotor * lag[2] - (by_q * lag[0] + by_v * lag[1] + by_a * lag[2]))

@@ -100,7 +100,9 @@ class Swing:
 
     def memory(self, share: float) -> int:
         """Return after how many samples no more than a share is left of a free swing; all if it does not fade so far."""
-        inertia, damping, stiffness = (np.einsum("iin->in", part) for part in (self.inertia, self.damping, self.stiffness))
+        inertia, damping, stiffness = (
+            np.einsum("iin->in", part) for part in (self.inertia, self.damping, self.stiffness)
+        )
         # An overdamped link creeps back at no less than the stiffness over the damping.
         swinging, creeping = damping * stiffness, 2.0 * inertia * stiffness
         with np.errstate(divide="ignore"):

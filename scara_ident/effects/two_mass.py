@@ -237,7 +237,9 @@ class TwoMasses:
         right, direct = np.zeros((2, len(acting), len(own), motion.samples))
         for a, joint in enumerate(own):
             turned, held = rotors[a, acting, None], usual[a, acting, None]
-            right[:, a] = -turned * moved.a[joint] - held * (turning[a] ** 2 * x[a] + 2.0 * ratio[a] * turning[a] * first[a])
+            right[:, a] = -turned * moved.a[joint] - held * (
+                turning[a] ** 2 * x[a] + 2.0 * ratio[a] * turning[a] * first[a]
+            )
             direct[:, a] = self._scale[a] * turned * second[a]
             if carrier:
                 at = np.searchsorted(acting, columns[a])

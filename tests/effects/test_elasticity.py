@@ -7,12 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scara_ident.effects import Member, Signals
+from scara_ident.effects import Member, Scene, Signals
 from scara_ident.effects.elasticity import Backlash, JointElasticity
 from scara_ident.effects.links import lagging, usual_link_inertia
 from scara_ident.model.model import build_model
 from scara_ident.robot.robot import load_robot
 from scara_ident.simulation import parse_effect, simulate, virtual_arm
+from tests.arms import Array
 from tests.effects.scenes import columns, fit, moving, scene_of, wandering
 
 
@@ -69,3 +70,39 @@ def test_what_no_gear_can_have_is_refused():
     assert JointElasticity().inadmissible(replace(scene, band=20.0), Member(0, (30.0, 0.7)), soft, std) is None
     assert "negative" in str(Backlash().inadmissible(scene, Member(0, (1e-3,)), np.array([-1e-4]), std))
     assert "rattle" in str(Backlash().inadmissible(scene, Member(0, (1e-3,)), np.array([0.2]), std))
+
+
+def test_columns_of_members_in_the_model_add_up_and_that_of_another_is_what_it_changes_beside_them():
+    family, scene = JointElasticity(), scene_of(load_robot())
+    item = moving(scene.robot, 3.0)
+    members = Member(0, (6.0, 0.1)), Member(1, (5.0, 0.1))
+    first, both = (replace(scene, together=tuple((family, one) for one in members[:k])) for k in (1, 2))
+
+    def torque(beside: Scene, member: Member) -> Array:
+        (column,) = family.signal_columns(Signals(beside, item), member)
+        tie = family.tie(beside, member)
+        assert tie is not None
+        return tie.value * column
+
+    alone = torque(scene, members[0])
+    assert np.array_equal(torque(first, members[0]), alone)
+    whole = torque(both, members[0]) + torque(both, members[1])
+    beside = alone + torque(first, members[1])
+    assert np.abs(whole - beside).max() < 1e-9 * np.abs(whole).max()
+    # Of other parameters than those in the model it is a candidate in their place.
+    assert np.array_equal(torque(both, members[0]), torque(both, replace(members[0])))
+    other = torque(both, Member(0, (6.5, 0.1)))
+    assert np.abs(other + torque(replace(scene, together=both.together[1:]), members[1]) - whole).max() > 1e-3
+    assert np.abs(alone + torque(scene, members[1]) - whole).max() > 0.05 * np.abs(whole).max()
+
+
+def test_a_link_whose_inertia_is_misjudged_lags_nothing_and_loads_no_other():
+    family, scene = JointElasticity(), scene_of(load_robot())
+    value = scene.value.copy()
+    place = scene.model.place(scene.model.rigid_body)
+    value[place] *= -1.0
+    item, member = moving(scene.robot, 1.0), Member(1, (5.0, 0.1))
+    misjudged = replace(scene, value=value, together=((family, Member(0, (6.0, 0.1))), (family, member)))
+    assert not usual_link_inertia(misjudged, 1) > 0.0
+    (column,) = family.signal_columns(Signals(misjudged, item), member)
+    assert np.all(column == 0.0)
