@@ -150,6 +150,9 @@ class TwoMasses:
             for slopes, part in zip(self._slopes, lag, strict=True):
                 load += times(slopes, part)
             lag = self.swing.solve(load, lag[0][:, :2])
+            if self._initial is not None and recorded is not None:
+                left = recorded[own] - signals.predicted[own] - signals.on_links[own] - self._changed(lag)[own]
+                lag = self._initial.added(lag, self._initial.state(left, (lag[0], lag[1])))
         return lag
 
     def _settled(self, torque: Array) -> Lag:
@@ -187,8 +190,12 @@ class TwoMasses:
     def _made_change(self) -> Array:
         if _small(self.lag):
             return np.asarray(sum(self.parts))
-        result = self._torque(self._behind(self.lag, len(self.joints))) - self.signals.rigid - self.signals.on_links
-        result[self.joints] += (self._scale * self._armature)[:, None] * self.lag[2]
+        return self._changed(self.lag)
+
+    def _changed(self, lag: Lag) -> Array:
+        """Return what lags change of all torques, of all orders."""
+        result = self._torque(self._behind(lag, len(self.joints))) - self.signals.rigid - self.signals.on_links
+        result[self.joints] += (self._scale * self._armature)[:, None] * lag[2]
         return np.asarray(result)
 
     @property
