@@ -50,7 +50,7 @@ def choose(
     beside = [item for item in first if item.candidate.effect.together and step.scene.together]
     best_gain = max((item.gain for item in accepted), default=0.0)
     found = fitted_beside(step, [item for item in first if item not in beside], best_gain, known)
-    found += _each_fitted(step, _promising(step, beside), beside, known)
+    found += _each_fitted(step, _promising(step, beside), beside, known) + _in_place_of_the_last(step, beside)
     fitted = {item.label for _, item in found}
     refused = {item.label: item for _, item in found if not item.accepted}
     accepted += _sure_once_refined(step, best, max((item.examination.held_out for item in accepted), default=0.0))
@@ -157,11 +157,16 @@ def _each_fitted(
     found = []
     for scene, candidate in begins.values():
         own, decision = fitted_with(replace(step, scene=scene), candidate, coarse=True)
-        before, left = float(np.sum(step.model.squares)), float(np.sum(decision.examination.left))
-        if decision.accepted and before - left < criteria.least_gain * before / step.scene.robot.n:
-            decision = replace(decision, accepted=False, why="takes the place of an effect in the model")
-        found.append((own, decision))
+        found.append((own, _if_more(step, decision)))
     return found
+
+
+def _if_more(step: SelectionStep, decision: Decision) -> Decision:
+    """Return a decision on what was fitted with the model of a step, refused where both leave as much as that alone."""
+    before, left = float(np.sum(step.model.squares)), float(np.sum(decision.examination.left))
+    if decision.accepted and before - left < step.criteria.least_gain * before / step.scene.robot.n:
+        return replace(decision, accepted=False, why="takes the place of an effect in the model")
+    return decision
 
 
 def fitted_with(step: SelectionStep, candidate: Candidate, *, coarse: bool = False) -> tuple[SelectionStep, Decision]:
@@ -232,6 +237,22 @@ def _promising(step: SelectionStep, points: Sequence[Decision]) -> list[Decision
     sure = [item for item in judged if more_than_chance(item, step.tried, step.criteria)]
     best = sorted(best_of_each(sure).values(), key=lambda item: -item.gain)
     return best[: step.criteria.most_fitted]
+
+
+def _in_place_of_the_last(step: SelectionStep, points: Sequence[Decision]) -> list[tuple[SelectionStep, Decision]]:
+    """Fit two effects that act together in the place of the last that came in, which may stand for both; see `Effect.instead`."""
+    last = step.chosen[-1] if step.chosen else None
+    labels = {item.label for item in points}
+    if last is None or not last.effect.together or not points:
+        return []
+    pairs = [(one, replace(last, member=other)) for one, other in last.effect.instead(step.scene, last.member)]
+    pairs = [(one, other) for one, other in pairs if other.label(step.scene) in labels]
+    found = []
+    for one, other in pairs[: step.criteria.most_fitted]:
+        begun = replace(step, chosen=(*step.chosen[:-1], replace(last, member=one)))
+        own, decision = fitted_with(begun, other, coarse=True)
+        found.append((own, _if_more(step, decision)))
+    return found
 
 
 def _left_again(step: SelectionStep, decision: Decision) -> str | None:

@@ -181,6 +181,15 @@ def together_of(chosen: Sequence[Candidate]) -> tuple[tuple[Effect, Member], ...
     return tuple(sorted(found, key=lambda item: item[1].place))
 
 
+def moved_together(chosen: Sequence[Candidate], scene: Scene) -> tuple[Candidate, ...]:
+    """Return the effects of a model with those whose members act together as a scene has them."""
+    known = {(effect, member.place): member for effect, member in scene.together}
+    return tuple(
+        replace(item, member=known.get((item.effect, item.member.place), item.member)) if item.effect.together else item
+        for item in chosen
+    )
+
+
 def filled_blocks(joints: Sequence[JointRows]) -> NDArray[np.intp]:
     """Return the places of the blocks that have rows of any joint."""
     return np.flatnonzero(sum(np.diff(rows.starts) for rows in joints))

@@ -316,6 +316,13 @@ class Effect(ABC):
         """
         raise NotImplementedError(f"{self.name} is tied and has no slopes")
 
+    def instead(self, scene: Scene, member: Member) -> tuple[tuple[Member, Member], ...]:
+        """Return two members of which one alone may have taken up what both do, to begin a fit of both, the likeliest first.
+
+        The first of them is of the member's joint.
+        """
+        return ()
+
     def essential(self, scene: Scene, member: Member) -> slice:
         """Return the coefficients of which one at least is not zero where the effect is there: all, unless one says it."""
         return slice(None)

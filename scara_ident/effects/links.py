@@ -351,30 +351,30 @@ def held_link_inertia(signals: Signals, joint: int) -> Array:
 
 def usual_link_inertia(scene: Scene, joint: int) -> float:
     """Return the mean of `link_inertia` over poses within a turn or a metre, at the joint; negative where misjudged."""
-    return float(np.mean(_moved_inertia(scene, joint))) - scene.armature(joint)
+    return float(np.mean(moved_inertia(scene, joint, joint))) - scene.armature(joint)
 
 
 def usual_link_inertia_slopes(scene: Scene, joint: int) -> Array:
     """Return the derivatives of `usual_link_inertia` by the parameters of the rigid bodies, shape (p,)."""
-    moved = np.mean(_inertia_columns(scene.model.rigid_body, joint), axis=0)
+    moved = np.mean(_inertia_columns(scene.model.rigid_body, joint, joint), axis=0)
     return np.asarray(moved - scene.armature_slopes(joint))
 
 
 def largest_armature(scene: Scene, joint: int) -> float:
     """Return the armature that would leave the link no inertia in its most folded pose; infinite where misjudged."""
-    moved = _moved_inertia(scene, joint)
+    moved = moved_inertia(scene, joint, joint)
     least = float(np.min(moved))
     return least if least > LEAST_FOLDED * float(np.mean(moved)) > 0.0 else np.inf
 
 
-def _moved_inertia(scene: Scene, joint: int) -> Array:
-    """Return the inertia that a joint moves with its rotor, the others held, over 40 poses, at the joint, shape (40,)."""
+def moved_inertia(scene: Scene, place: int, joint: int) -> Array:
+    """Return the torque at one joint per acceleration of another or its own with the rotor, over 40 poses, shape (40,)."""
     term = scene.model.rigid_body
-    return np.asarray(_inertia_columns(term, joint) @ scene.value[scene.model.place(term)])
+    return np.asarray(_inertia_columns(term, place, joint) @ scene.value[scene.model.place(term)])
 
 
-@lru_cache(maxsize=32)
-def _inertia_columns(term: RigidBody, joint: int) -> Array:
+@lru_cache(maxsize=64)
+def _inertia_columns(term: RigidBody, place: int, joint: int) -> Array:
     """Return that inertia per parameter of the rigid bodies, shape (40, p)."""
     robot = term.robot
     reach = np.where(robot.prismatic, 1.0, np.pi)[:, None]
@@ -382,7 +382,7 @@ def _inertia_columns(term: RigidBody, joint: int) -> Array:
     rest, pushed = np.zeros_like(q), np.zeros_like(q)
     pushed[joint] = 1.0
     still, moved = (Motion("poses", "poses", np.arange(40.0), q, rest, a, None, 1.0) for a in (rest, pushed))
-    return np.asarray((term.regressor(moved) - term.regressor(still))[joint].T / robot.row_scale[joint])
+    return np.asarray((term.regressor(moved) - term.regressor(still))[place].T / robot.row_scale[place])
 
 
 def guessed_armatures(scene: Scene) -> dict[int, float]:

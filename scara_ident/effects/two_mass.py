@@ -30,6 +30,7 @@ from scara_ident.effects.links import (
     lagging_at,
     lagging_slopes,
     link_slopes,
+    moved_inertia,
     on_links_at,
     rigid_torque,
     shared,
@@ -37,7 +38,7 @@ from scara_ident.effects.links import (
     usual_link_inertia_slopes,
 )
 from scara_ident.effects.parameters import Member
-from scara_ident.effects.signals import Signals
+from scara_ident.effects.signals import Scene, Signals
 from scara_ident.effects.swing import InitialState, Lag, Swing, free_swings, times
 from scara_ident.model.terms import joint_rows
 from scara_ident.motion.motion import Motion
@@ -318,6 +319,14 @@ class TwoMasses:
         if name not in held:
             held[name] = make()
         return held[name]
+
+
+def usual_coupling(scene: Scene, joint: int, other: int) -> float:
+    """Return the inertia that two links share over the mean of their own, rms over poses; 0 where misjudged."""
+    own = usual_link_inertia(scene, joint), usual_link_inertia(scene, other)
+    if not min(own) > 0.0:
+        return 0.0
+    return float(np.sqrt(np.mean(moved_inertia(scene, joint, other) ** 2) / (own[0] * own[1])))
 
 
 def _small(lag: Lag) -> bool:
