@@ -147,7 +147,6 @@ def _each_fitted(
     step: SelectionStep, worth: Sequence[Decision], candidates: Sequence[Decision], known: SelectionStep | None
 ) -> list[tuple[SelectionStep, Decision]]:
     """Return what `fitted_beside` does of those of the candidates that are worth it."""
-    criteria = step.criteria
     begins = {item.label: (step.scene, item.candidate) for item in worth}
     if known is not None:
         # Found in another band: from there it is near.

@@ -10,10 +10,11 @@ import pytest
 from scara_ident.effects import Member, Scene, Signals
 from scara_ident.effects.elasticity import Backlash, JointElasticity
 from scara_ident.effects.links import lagging, usual_link_inertia
+from scara_ident.effects.two_mass import TwoMasses, usual_coupling
 from scara_ident.model.model import build_model
 from scara_ident.robot.robot import load_robot
 from scara_ident.simulation import parse_effect, simulate, virtual_arm
-from tests.arms import Array
+from tests.arms import Array, example_urdf
 from tests.effects.scenes import columns, fit, moving, scene_of, wandering
 
 
@@ -106,3 +107,24 @@ def test_a_link_whose_inertia_is_misjudged_lags_nothing_and_loads_no_other():
     assert not usual_link_inertia(misjudged, 1) > 0.0
     (column,) = family.signal_columns(Signals(misjudged, item), member)
     assert np.all(column == 0.0)
+
+
+def test_one_soft_gear_may_stand_for_two_of_links_that_share_their_inertia():
+    family, robot = JointElasticity(), load_robot(example_urdf("ur5_robot.urdf"))
+    scene, member = scene_of(robot), Member(1, (4.0, 0.03))
+    pairs = family.instead(scene, member)
+    # The elbow first, and not the pan, whose axis stands across that of the lift.
+    assert pairs[0][1].joint == 2 and all(one.joint == 1 and one.nonlinear == other.nonlinear for one, other in pairs)
+    assert 0 not in {other.joint for _, other in pairs}
+    both = pairs[0]
+    item = moving(robot, 0.1)
+    masses = TwoMasses(Signals(scene, item), both)
+    inertia = np.diag(masses.inertia)
+    inertia[0, 1] = inertia[1, 0] = usual_coupling(scene, 1, 2) * np.sqrt(masses.inertia[0] * masses.inertia[1])
+    slowest = np.sqrt(np.min(np.linalg.eigvals(np.linalg.solve(inertia, np.diag(masses.stiffness))).real)) / (
+        2.0 * np.pi
+    )
+    assert slowest == pytest.approx(4.0)
+    beside = replace(scene, together=((family, member), (family, Member(2, (9.0, 0.1)))))
+    assert 2 not in {other.joint for _, other in family.instead(beside, member)}
+    assert family.instead(replace(scene, value=-scene.value), member) == ()
