@@ -147,15 +147,19 @@ def _each_fitted(
     step: SelectionStep, worth: Sequence[Decision], candidates: Sequence[Decision], known: SelectionStep | None
 ) -> list[tuple[SelectionStep, Decision]]:
     """Return what `fitted_beside` does of those of the candidates that are worth it."""
-    begins = {item.label: (step.scene, item.candidate) for item in worth}
+    begins = {item.label: (step, item.candidate) for item in worth}
     if known is not None:
         # Found in another band: from there it is near.
         scene = replace(step.scene, value=known.scene.value, armatures=known.scene.armatures)
         labels = {item.label for item in candidates}
-        begins |= {item.label(scene): (scene, item) for item in known.chosen if item.label(scene) in labels}
+        for item in (item for item in known.chosen if item.label(scene) in labels):
+            # One of several that act together may be sure only beside the others.
+            others = [other for other in known.chosen if other.effect.together and other.label(scene) in labels]
+            beside = [other for other in others if item.effect.together and other is not item]
+            begins[item.label(scene)] = replace(step, scene=scene, chosen=(*step.chosen, *beside)), item
     found = []
-    for scene, candidate in begins.values():
-        own, decision = fitted_with(replace(step, scene=scene), candidate, coarse=True)
+    for begun, candidate in begins.values():
+        own, decision = fitted_with(begun, candidate, coarse=True)
         found.append((own, _if_more(step, decision)))
     return found
 
