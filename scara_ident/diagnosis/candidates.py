@@ -248,7 +248,10 @@ def _key(scene: Scene, candidate: Candidate) -> Key:
     if not effect.follows_estimate:
         return effect, member, None
     loaded = effect.geared_joint(member) is not None
-    on_links, together = scene.link_torques if loaded else (), scene.together if effect.together else ()
+    on_links = scene.link_torques if loaded else ()
+    # The only one in the model acts as it does beside it.
+    alone = not effect.together or set(scene.together) <= {(effect, member)}
+    together = () if alone else scene.together
     return effect, member, _estimate(scene, on_links, together)
 
 
