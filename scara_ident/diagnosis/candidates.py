@@ -25,6 +25,8 @@ from scara_ident.threads import side_by_side
 Rows = dict[int, Array]
 # Effect, member, and the estimate where its columns follow that.
 Key = tuple[Effect, Member, Hashable]
+# Members that act together, see `Scene.together`.
+Together = tuple[tuple[Effect, Member], ...]
 
 # Columns that pass the low-pass together: enough for two threads, and little memory.
 AT_ONCE = 32
@@ -217,7 +219,15 @@ class CandidateColumns:
 
     def forget_all_but(self, *scenes: Scene) -> None:
         """Forget columns that follow other estimates than those of some scenes."""
-        current = {None, *(_estimate(scene, of) for scene in scenes for of in ((), scene.link_torques))}
+        current = {
+            None,
+            *(
+                _estimate(scene, of, beside)
+                for scene in scenes
+                for of in ((), scene.link_torques)
+                for beside in ((), scene.together)
+            ),
+        }
         for held in (self._rows, self._raw):
             for key in [key for key in held if key[2] not in current]:
                 del held[key]
@@ -229,8 +239,8 @@ def columns_at_hand(observations: Observations) -> dict[Motion, tuple[Array, ...
     return {part.motion: raw for part, raw in zip(observations.data.stretches, raws, strict=True)}
 
 
-def _estimate(scene: Scene, on_links: tuple[LinkTorque, ...]) -> Hashable:
-    return scene.value.tobytes(), tuple(sorted(scene.armatures.items())), on_links
+def _estimate(scene: Scene, on_links: tuple[LinkTorque, ...], together: Together) -> Hashable:
+    return scene.value.tobytes(), tuple(sorted(scene.armatures.items())), on_links, together
 
 
 def _key(scene: Scene, candidate: Candidate) -> Key:
@@ -238,7 +248,11 @@ def _key(scene: Scene, candidate: Candidate) -> Key:
     if not effect.follows_estimate:
         return effect, member, None
     loaded = effect.geared_joint(member) is not None
-    return effect, member, _estimate(scene, scene.link_torques if loaded else ())
+    on_links = scene.link_torques if loaded else ()
+    # The only one in the model acts as it does beside it.
+    alone = not effect.together or set(scene.together) <= {(effect, member)}
+    together = () if alone else scene.together
+    return effect, member, _estimate(scene, on_links, together)
 
 
 def _on_stretch(

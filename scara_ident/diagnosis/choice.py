@@ -13,7 +13,7 @@ from scara_ident.diagnosis.correction import taken_out
 from scara_ident.diagnosis.criteria import SelectionCriteria
 from scara_ident.diagnosis.effect_parameters import parameters_beside, told_size
 from scara_ident.diagnosis.noise_check import noise_objection
-from scara_ident.diagnosis.nonlinear_fit import tune
+from scara_ident.diagnosis.nonlinear_fit import freed_model, tune
 from scara_ident.diagnosis.remainder_check import remainder_objection
 from scara_ident.diagnosis.selection_step import SelectionStep, best_of_each, points_of_lines
 from scara_ident.diagnosis.setpoints import setpoint_objection
@@ -47,7 +47,10 @@ def choose(
     best = [item for family in by_family.values() for item in best_of_each(family).values()]
     first = [item for item in decisions if item.candidate.effect.fitted_first]
     accepted = [item for item in best if item.accepted and not item.candidate.effect.fitted_first]
-    found = fitted_beside(step, first, max((item.gain for item in accepted), default=0.0), known)
+    beside = [item for item in first if item.candidate.effect.together and step.scene.together]
+    best_gain = max((item.gain for item in accepted), default=0.0)
+    found = fitted_beside(step, [item for item in first if item not in beside], best_gain, known)
+    found += _each_fitted(step, _promising(step, beside), beside, known) + _in_place_of_the_last(step, beside)
     fitted = {item.label for _, item in found}
     refused = {item.label: item for _, item in found if not item.accepted}
     accepted += _sure_once_refined(step, best, max((item.examination.held_out for item in accepted), default=0.0))
@@ -85,6 +88,10 @@ def _soundest(
         pairs = [(step, item) for item in refined if item.accepted] + [pair for pair in leaders if pair[0] is not step]
         for own, decision in best_first(pairs):
             why = objection(own, decision)
+            if why is not None and decision.candidate.effect.together and own.scene.together:
+                # Beside others that it acts with a coarse fit ends early: what they took up of it goes back to it slowly.
+                own, decision = fitted_with(own, decision.candidate)
+                why = objection(own, decision) if decision.accepted else decision.why
             if why is None:
                 return own, decision
             refused[decision.label] = decision.refused(why)
@@ -133,21 +140,36 @@ def fitted_beside(
     """
     criteria = step.criteria
     enough = max(criteria.least_gain, criteria.near_best * best)
-    worth = _worth_fitting(candidates, enough, step.tried, criteria)
-    begins = {item.label: (step.scene, item.candidate) for item in worth}
+    return _each_fitted(step, _worth_fitting(candidates, enough, step.tried, criteria), candidates, known)
+
+
+def _each_fitted(
+    step: SelectionStep, worth: Sequence[Decision], candidates: Sequence[Decision], known: SelectionStep | None
+) -> list[tuple[SelectionStep, Decision]]:
+    """Return what `fitted_beside` does of those of the candidates that are worth it."""
+    begins = {item.label: (step, item.candidate) for item in worth}
     if known is not None:
         # Found in another band: from there it is near.
         scene = replace(step.scene, value=known.scene.value, armatures=known.scene.armatures)
         labels = {item.label for item in candidates}
-        begins |= {item.label(scene): (scene, item) for item in known.chosen if item.label(scene) in labels}
+        for item in (item for item in known.chosen if item.label(scene) in labels):
+            # One of several that act together may be sure only beside the others.
+            others = [other for other in known.chosen if other.effect.together and other.label(scene) in labels]
+            beside = [other for other in others if item.effect.together and other is not item]
+            begins[item.label(scene)] = replace(step, scene=scene, chosen=(*step.chosen, *beside)), item
     found = []
-    for scene, candidate in begins.values():
-        own, decision = fitted_with(replace(step, scene=scene), candidate, coarse=True)
-        before, left = float(np.sum(step.model.squares)), float(np.sum(decision.examination.left))
-        if decision.accepted and before - left < criteria.least_gain * before / step.scene.robot.n:
-            decision = replace(decision, accepted=False, why="takes the place of an effect in the model")
-        found.append((own, decision))
+    for begun, candidate in begins.values():
+        own, decision = fitted_with(begun, candidate, coarse=True)
+        found.append((own, _if_more(step, decision)))
     return found
+
+
+def _if_more(step: SelectionStep, decision: Decision) -> Decision:
+    """Return a decision on what was fitted with the model of a step, refused where both leave as much as that alone."""
+    before, left = float(np.sum(step.model.squares)), float(np.sum(decision.examination.left))
+    if decision.accepted and before - left < step.criteria.least_gain * before / step.scene.robot.n:
+        return replace(decision, accepted=False, why="takes the place of an effect in the model")
+    return decision
 
 
 def fitted_with(step: SelectionStep, candidate: Candidate, *, coarse: bool = False) -> tuple[SelectionStep, Decision]:
@@ -204,6 +226,36 @@ def _worth_fitting(
     large = {item.candidate.effect.name for item in best if item.gain >= enough}
     best.sort(key=lambda item: -item.gain)
     return [item for item in best if item.candidate.effect.name in large][: criteria.most_fitted]
+
+
+def _promising(step: SelectionStep, points: Sequence[Decision]) -> list[Decision]:
+    """Return the best points, more than chance would bring, of those that act together with effects in the model.
+
+    These were fitted as if there were no others: what a candidate would add is seen once they may give way. How much that is
+    the fit says.
+    """
+    if not points:
+        return []
+    judged = step.judge([item.candidate for item in points], model=freed_model(step))
+    sure = [item for item in judged if more_than_chance(item, step.tried, step.criteria)]
+    best = sorted(best_of_each(sure).values(), key=lambda item: -item.gain)
+    return best[: step.criteria.most_fitted]
+
+
+def _in_place_of_the_last(step: SelectionStep, points: Sequence[Decision]) -> list[tuple[SelectionStep, Decision]]:
+    """Fit two effects that act together in the place of the last that came in, which may stand for both; see `Effect.instead`."""
+    last = step.chosen[-1] if step.chosen else None
+    labels = {item.label for item in points}
+    if last is None or not last.effect.together or not points:
+        return []
+    pairs = [(one, replace(last, member=other)) for one, other in last.effect.instead(step.scene, last.member)]
+    pairs = [(one, other) for one, other in pairs if other.label(step.scene) in labels]
+    found = []
+    for one, other in pairs[: step.criteria.most_fitted]:
+        begun = replace(step, chosen=(*step.chosen[:-1], replace(last, member=one)))
+        own, decision = fitted_with(begun, other, coarse=True)
+        found.append((own, _if_more(step, decision)))
+    return found
 
 
 def _left_again(step: SelectionStep, decision: Decision) -> str | None:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.at_estimate import at_estimate, estimate_of, without_others
 from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, Rows, with_columns
+from scara_ident.diagnosis.fitted_model import FittedModel
 from scara_ident.diagnosis.selection_step import SelectionStep
 from scara_ident.diagnosis.unknowns import Unknown, unknowns_of
 from scara_ident.effects import Scene, Tie
@@ -167,6 +168,15 @@ def linearise(step: SelectionStep) -> Linearised:
     extended = tuple(_beside(rows, joint, changes, linear) for joint, rows in enumerate(joints))
     information = _pooled(extended, total, weights, step.offsets)
     return Linearised(scene, chosen, unknowns, places, extended, information, held)
+
+
+def freed_model(step: SelectionStep) -> FittedModel:
+    """Return a fitted model in which nonlinear parameters may move with all others, as far as it is linear in them.
+
+    What takes up most of what is missing by a wrong value of them leaves nothing of it to candidates beside them as they are.
+    """
+    state = linearise(step)
+    return step.fitted(state.joints, state.information.parameters)
 
 
 def _solved(information: Information, ties: Information, linear: int) -> Array:

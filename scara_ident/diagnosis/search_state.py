@@ -12,7 +12,7 @@ from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.correction import Correction, taken_out
 from scara_ident.diagnosis.interval_fit import refined
 from scara_ident.diagnosis.nonlinear_fit import tune
-from scara_ident.diagnosis.selection_step import SelectionStep, observed
+from scara_ident.diagnosis.selection_step import SelectionStep, moved_together, observed
 from scara_ident.effects import Scene
 from scara_ident.estimation.least_squares import value_and_weights
 from scara_ident.estimation.run_offsets import rms_of
@@ -84,8 +84,10 @@ class SearchState:
         return {item.label(self.step.scene) for item in self.step.chosen}
 
     def at(self, scene: Scene) -> SearchState:
-        """Return the state at another estimate."""
-        return self if scene is self.step.scene else replace(self, step=replace(self.step, scene=scene))
+        """Return the state at another estimate, members that act together as they were fitted there."""
+        if scene is self.step.scene:
+            return self
+        return replace(self, step=replace(self.step, scene=scene, chosen=moved_together(self.step.chosen, scene)))
 
     def to_go_back_to(self, winner: Decision) -> SearchState:
         """Return the state without what it only keeps to save time, once an effect has come in."""

@@ -16,7 +16,7 @@ from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, Rows, 
 from scara_ident.diagnosis.criteria import SelectionCriteria
 from scara_ident.diagnosis.fitted_model import FittedModel
 from scara_ident.diagnosis.row_test import examine_rows
-from scara_ident.effects import Scene
+from scara_ident.effects import Effect, Member, Scene
 from scara_ident.estimation.joint_rows import JointRows
 from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.run_offsets import offsets_on
@@ -58,6 +58,12 @@ class SelectionStep:
     variation: RunVariation | None = None
     rest: Candidate | None = None
 
+    def __post_init__(self) -> None:
+        """Let the scene know which members act together: others in the model make other columns."""
+        together = together_of(self.chosen)
+        if together != self.scene.together:
+            object.__setattr__(self, "scene", replace(self.scene, together=together))
+
     @property
     def observations(self) -> Observations:
         """Of the base model."""
@@ -67,7 +73,11 @@ class SelectionStep:
     def model(self) -> FittedModel:
         """The base model with the chosen effects, fitted."""
         own = self.columns.rows(self.scene, self.chosen)
-        model = fitted_model(self.observations, own, self.weights, self.criteria.parts)
+        return self.fitted(with_columns(self.observations, own), _parameters(self.observations, own))
+
+    def fitted(self, joints: Sequence[JointRows], parameters: int) -> FittedModel:
+        """Return the model of some rows that so many parameters have columns on, fitted."""
+        model = fitted_rows(self.observations, joints, parameters, self.weights, self.criteria.parts)
         if self.variation is None:
             return model
         return replace(model, joints=self.variation.whitened_rows(model.joints))
@@ -102,9 +112,13 @@ class SelectionStep:
         return [{joint: self.variation.whitened(joint, own) for joint, own in rows.items()} for rows in found]
 
     def rows_at_hand(self, first: Scene, candidates: Sequence[Candidate]) -> list[Rows]:
-        """Return the columns that candidates have at another scene, or at this one where the load is another by effects found."""
+        """Return the columns that candidates have at another scene, or at this one where effects found make others of them."""
         acting = {j for item in self.scene.link_torques for j in item.effect.rows(self.scene, item.member)}
-        loaded = [item.effect.of_load and item.effect.geared_joint(item.member) in acting for item in candidates]
+        loaded = [
+            (item.effect.of_load and item.effect.geared_joint(item.member) in acting)
+            or (item.effect.together and bool(self.scene.together))
+            for item in candidates
+        ]
         found: list[Rows | None] = [None] * len(candidates)
         for scene, own in ((first, False), (self.scene, True)):
             places = [k for k, which in enumerate(loaded) if which is own]
@@ -112,14 +126,25 @@ class SelectionStep:
                 found[k] = rows
         return [rows for rows in found if rows is not None]
 
-    def judge(self, candidates: Sequence[Candidate], first: Scene | None = None) -> list[Decision]:
-        """Examine candidates, by the columns at hand of another scene if one is given, and decide on each."""
+    def judge(
+        self, candidates: Sequence[Candidate], first: Scene | None = None, model: FittedModel | None = None
+    ) -> list[Decision]:
+        """Examine candidates beside the model, and decide on each.
+
+        Parameters
+        ----------
+        first : Scene, optional
+            By whose columns at hand they are judged; default: the step's.
+        model : FittedModel, optional
+            In the place of the step's; see `scara_ident.diagnosis.nonlinear_fit.freed_model`.
+        """
+        model = self.model if model is None else model
         rows = self.rows(self.scene, candidates) if first is None else self.rows_at_hand(first, candidates)
-        found = examine(self.model, rows, self.criteria)
-        gained = gains(self.model, rows, [item.member.joint for item in candidates], found)
+        found = examine(model, rows, self.criteria)
+        gained = gains(model, rows, [item.member.joint for item in candidates], found)
         for k, (result, gain) in enumerate(zip(found, gained, strict=True)):
             if self.in_doubt(result, gain):
-                found[k] = examine_rows(self.model, rows[k], result)
+                found[k] = examine_rows(model, rows[k], result)
         return [
             decide(item, result, gain, self.scene, self.tried, self.criteria)
             for item, result, gain in zip(candidates, found, gained, strict=True)
@@ -150,6 +175,21 @@ class SelectionStep:
         return current
 
 
+def together_of(chosen: Sequence[Candidate]) -> tuple[tuple[Effect, Member], ...]:
+    """Return the effects of a model whose members act together, see `Scene.together`."""
+    found = [(item.effect, item.member) for item in chosen if item.effect.together]
+    return tuple(sorted(found, key=lambda item: item[1].place))
+
+
+def moved_together(chosen: Sequence[Candidate], scene: Scene) -> tuple[Candidate, ...]:
+    """Return the effects of a model with those whose members act together as a scene has them."""
+    known = {(effect, member.place): member for effect, member in scene.together}
+    return tuple(
+        replace(item, member=known.get((item.effect, item.member.place), item.member)) if item.effect.together else item
+        for item in chosen
+    )
+
+
 def filled_blocks(joints: Sequence[JointRows]) -> NDArray[np.intp]:
     """Return the places of the blocks that have rows of any joint."""
     return np.flatnonzero(sum(np.diff(rows.starts) for rows in joints))
@@ -158,6 +198,17 @@ def filled_blocks(joints: Sequence[JointRows]) -> NDArray[np.intp]:
 def fitted_model(observations: Observations, chosen: Sequence[Rows], weights: Array, parts: int) -> FittedModel:
     """Return the base model with further columns, to be tried beside; blocks without any row are left out."""
     joints = with_columns(observations, chosen)
+    return fitted_rows(observations, joints, _parameters(observations, chosen), weights, parts)
+
+
+def _parameters(observations: Observations, chosen: Sequence[Rows]) -> int:
+    return observations.parameters + sum(len(next(iter(rows.values()))) for rows in chosen)
+
+
+def fitted_rows(
+    observations: Observations, joints: Sequence[JointRows], parameters: int, weights: Array, parts: int
+) -> FittedModel:
+    """Return the model of some rows that so many parameters have columns on; blocks without any row are left out."""
     filled = filled_blocks(joints)
     owner = observations.owner[filled]
     # No column of a row is lost: only empty blocks go.
@@ -165,7 +216,6 @@ def fitted_model(observations: Observations, chosen: Sequence[Rows], weights: Ar
         JointRows(rows.columns, rows.table, np.append(rows.starts[:-1][filled], rows.starts[-1]), rows.counts[filled])
         for rows in joints
     )
-    parameters = observations.parameters + sum(len(next(iter(rows.values()))) for rows in chosen)
     fold = folds_of(observations.data, owner, filled, parts)
     return FittedModel(joints, parameters, owner, fold, weights)
 

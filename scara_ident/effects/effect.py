@@ -68,6 +68,9 @@ class Effect(ABC):
         and are made again to be tried beside it.
     fitted_first : bool
         Whether it is judged at the estimate fitted with it only: its columns at the estimate without it are poor ones.
+    together : bool
+        Whether what its members do follows from those of other joints in the model too, `Scene.together`: the columns of members
+        that are in it add up to what all of them do, those of another are what it changes beside them.
     by_recording, in_intervals : bool
         Whether it acts in some recordings and not in others, see `in_recordings`, or in intervals that its member holds.
     same_at_all_frequencies : bool
@@ -99,6 +102,7 @@ class Effect(ABC):
     on_links: ClassVar[bool] = False
     of_load: ClassVar[bool] = False
     fitted_first: ClassVar[bool] = False
+    together: ClassVar[bool] = False
     by_recording: ClassVar[bool] = False
     in_intervals: ClassVar[bool] = False
     same_at_all_frequencies: ClassVar[bool] = False
@@ -311,6 +315,13 @@ class Effect(ABC):
             Places among the ``p + 1 + s`` of `Tie.slopes`, and the derivatives by these; all others are zero.
         """
         raise NotImplementedError(f"{self.name} is tied and has no slopes")
+
+    def instead(self, scene: Scene, member: Member) -> tuple[tuple[Member, Member], ...]:
+        """Return two members of which one alone may have taken up what both do, to begin a fit of both, the likeliest first.
+
+        The first of them is of the member's joint.
+        """
+        return ()
 
     def essential(self, scene: Scene, member: Member) -> slice:
         """Return the coefficients of which one at least is not zero where the effect is there: all, unless one says it."""

@@ -16,7 +16,7 @@ from scara_ident.effects.links import usual_link_inertia, usual_link_inertia_slo
 from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, Parameter, Tie, View, deviation
 from scara_ident.effects.second_encoder import gear_stiffness
 from scara_ident.effects.signals import Scene, Signals
-from scara_ident.effects.two_mass import TwoMasses
+from scara_ident.effects.two_mass import TwoMasses, usual_coupling
 from scara_ident.motion.prepared import PreparedRecording
 
 # Frequencies of the link against its held motor that are tried, a factor apart, from the lowest to so many bands.
@@ -32,6 +32,10 @@ LOWEST_DAMPING, HIGHEST_DAMPING = 0.02, 0.7
 ALL_BUT_DAMPED = 0.999
 # A resonance is told from a softer gear by what is above it: the band reaches so many times its frequency.
 BOTH_SIDES = 1.5
+# Links that share less of their inertia hardly swing together.
+LEAST_COUPLING = 0.2
+# With less damping than this two gears are not fitted from a guess: the phase after a few swings would be anything.
+STEADY_DAMPING = 0.05
 # Clearances tried, rad or m at the joint: three times apart, which refinement bridges.
 WIDTHS = (3e-4, 1e-3, 3e-3)
 # The motion that is known within a band rounds off the blow of a landing: recordings without noise give a width that is up to
@@ -77,6 +81,7 @@ class JointElasticity(BehindGear):
         NonlinearParameter("_damping_ratio", "1", LOWEST_DAMPING, HIGHEST_DAMPING),
     )
     fitted_first = True
+    together = True
     view = View("acceleration")
     experiment = "excite above 5 Hz with short steps, and look for a resonance that stays at its frequency"
 
@@ -96,9 +101,23 @@ class JointElasticity(BehindGear):
         return super().words(scene, member) | {"compliance": unit}
 
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
-        """Return the change of torque per compliance."""
-        masses = TwoMasses(signals, member.place, *member.nonlinear)
-        return [masses.stiffness * masses.change if masses.inertia > 0.0 else np.zeros_like(signals.motion.q)]
+        """Return the change of torque per compliance, of a member that is not in the model beside those that are."""
+        if not usual_link_inertia(signals.scene, member.place) > 0.0:
+            return [np.zeros_like(signals.motion.q)]
+        members = self._swinging(signals.scene, member)
+        masses = TwoMasses(signals, members)
+        stiffness = masses.stiffness[members.index(member)]
+        if (self, member) in signals.scene.together:
+            return [stiffness * masses.parts[members.index(member)]]
+        others = tuple(item for item in members if item is not member)
+        without = TwoMasses(signals, others).change if others else 0.0
+        return [stiffness * (masses.change - without)]
+
+    def _swinging(self, scene: Scene, member: Member) -> tuple[Member, ...]:
+        """Return a member and those of other joints in the model, in the order of joints."""
+        others = [item for effect, item in scene.together if effect == self and item.place != member.place]
+        moving = [item for item in others if usual_link_inertia(scene, item.place) > 0.0]
+        return tuple(sorted([*moving, member], key=lambda item: item.place))
 
     def tie(self, scene: Scene, member: Member) -> Tie | None:
         """Return the compliance that goes with the frequency."""
@@ -110,8 +129,24 @@ class JointElasticity(BehindGear):
         return Tie(compliance, -compliance * np.append(bodies / inertia, [2.0 / member.nonlinear[0], 0.0]))
 
     def slopes(self, signals: Signals, member: Member) -> Iterable[tuple[NDArray[np.intp], Array]]:
-        """Give the derivatives with the compliance as it is."""
-        return TwoMasses(signals, member.place, *member.nonlinear).slopes()
+        """Give the derivatives of what all members in the model do, with the compliances as they are."""
+        members = self._swinging(signals.scene, member)
+        return TwoMasses(signals, members).slopes(members.index(member))
+
+    def instead(self, scene: Scene, member: Member) -> tuple[tuple[Member, Member], ...]:
+        """Return gears of two links that share much of their inertia: one softer gear swings as slowly as both together."""
+        frequency, ratio = member.nonlinear
+        taken = {item.place for effect, item in scene.together if effect == self}
+        found = {
+            j: usual_coupling(scene, member.place, j) for j in self.joints(scene) if j not in {member.place, *taken}
+        }
+        pairs = []
+        for j in sorted((j for j in found if found[j] > LEAST_COUPLING), key=lambda j: -found[j]):
+            # Of two alike, the slower way to swing together.
+            both = frequency * np.sqrt(1.0 + min(found[j], 1.0)), max(ratio, STEADY_DAMPING)
+            if both[0] < HIGHEST_FREQUENCY:
+                pairs.append((Member(member.place, both), Member(j, both)))
+        return tuple(pairs)
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """Say so where a spring does not pull back, would swing slower than is seen, or does not swing at all."""

@@ -276,7 +276,7 @@ def behind(motion: Motion, joint: int, lag: tuple[Array, Array, Array]) -> Motio
 
 
 def lagging(signals: Signals, joint: int, lag: tuple[Array, Array, Array]) -> Array:
-    """Change of all torques when the link of one joint lags its motor, to first order in the lag.
+    """Return the change of all torques (n, N), recorded side, when the link of one joint lags its motor, to first order in the lag.
 
     The motor, whose rotor is not part of what lags, moves as recorded.
 
@@ -284,58 +284,56 @@ def lagging(signals: Signals, joint: int, lag: tuple[Array, Array, Array]) -> Ar
     ----------
     lag : tuple of ndarray (N,)
         Motor's position less the link's, at the joint, with its first two derivatives; may be of the first samples alone.
-
-    Returns
-    -------
-    ndarray, shape (n, N)
-        Recorded side.
     """
-    by_q, by_v, by_a = (slope[:, : len(lag[0])] for slope in link_slopes(signals, joint))
-    result = -(by_q * lag[0] + by_v * lag[1] + by_a * lag[2])
-    result[joint] = own_lagging(signals, joint, lag)
-    return np.asarray(result)
+    return np.array([lagging_at(signals, place, joint, lag) for place in range(signals.scene.robot.n)])
 
 
 def lagging_slopes(
-    signals: Signals, joint: int, bodies: Sequence[Array], acting: NDArray[np.intp], lags: tuple[Array, Array, Array]
+    signals: Signals,
+    joints: Sequence[int],
+    bodies: Sequence[Array],
+    acting: NDArray[np.intp],
+    lags: Sequence[tuple[Array, Array, Array]],
 ) -> Iterator[tuple[NDArray[np.intp], Array]]:
-    """Give of each joint the derivatives of the torque that a lag changes by parameters, those first that are the rigid bodies'.
+    """Give of each joint the derivatives of the torque that lags change by parameters, those first that are the rigid bodies'.
 
     Parameters
     ----------
-    joint : int
-        That whose link lags.
+    joints : sequence of int
+        Those whose links lag.
     bodies : sequence of ndarray, shape (k, N)
-        Of each joint the rigid bodies' columns that act on it, at the motion of the links.
+        Of each joint the rigid bodies' columns that act on it, at the motion of the links; none where these do not vary.
     acting : ndarray of int, shape (m,)
-        Parameters that the lag depends on.
-    lags : tuple of ndarray, shape (m, N)
-        Derivatives of the lag by these, and of its first two derivatives.
+        Parameters that the lags depend on.
+    lags : sequence of tuple of ndarray, shape (m, N)
+        Of each lagging joint the derivatives of the lag by these, and of its first two derivatives.
 
     Yields
     ------
     tuple of (ndarray of int, shape (l,), ndarray, shape (l, N))
         The parameters in their order, and their derivatives; of all others they are zero.
     """
-    scene, slopes = signals.scene, link_slopes(signals, joint)
-    for j, (moved, recorded) in enumerate(zip(bodies, rigid_rows(signals), strict=True)):
-        own = np.flatnonzero(scene.model.rigid_body.pattern[j])
-        places, count = np.union1d(own, acting), moved.shape[1]
-        rotor = scene.robot.row_scale[j] * scene.armature(j) if j == joint else 0.0
-        by_q, by_v, by_a = slopes[0][j], slopes[1][j], slopes[2][j] - rotor
+    scene, count = signals.scene, signals.motion.samples
+    slopes = [link_slopes(signals, joint) for joint in joints]
+    for j in range(scene.robot.n):
+        own = np.flatnonzero(scene.model.rigid_body.pattern[j]) if bodies else np.zeros(0, dtype=np.intp)
+        places = np.union1d(own, acting)
         at, result = np.searchsorted(places, acting), np.zeros((len(places), count))
-        for start in range(0, count, CHUNK):
-            some = slice(start, start + CHUNK)
-            x, first, second = (part[:, some] for part in lags)
-            result[at, some] = -(by_q[some] * x + by_v[some] * first + by_a[some] * second)
-        result[np.searchsorted(places, own)] += moved - recorded
+        for joint, (by_q, by_v, by_a), lag in zip(joints, slopes, lags, strict=True):
+            along = by_a[j] - (scene.robot.row_scale[j] * scene.armature(j) if j == joint else 0.0)
+            for start in range(0, count, CHUNK):
+                some = slice(start, start + CHUNK)
+                x, first, second = (part[:, some] for part in lag)
+                result[at, some] -= by_q[j, some] * x + by_v[j, some] * first + along[some] * second
+        if bodies:
+            result[np.searchsorted(places, own)] += bodies[j] - rigid_rows(signals)[j]
         yield places, result
 
 
-def own_lagging(signals: Signals, joint: int, lag: tuple[Array, Array, Array]) -> Array:
-    """Return what `lagging` changes at the lagging joint itself, of one lag (N,) or of several (..., N)."""
-    by_q, by_v, by_a = (slope[joint, : lag[0].shape[-1]] for slope in link_slopes(signals, joint))
-    rotor = signals.scene.robot.row_scale[joint] * signals.scene.armature(joint)
+def lagging_at(signals: Signals, place: int, joint: int, lag: tuple[Array, Array, Array]) -> Array:
+    """Return what `lagging` changes at the joint of a place, of one lag (N,) or of several (..., N)."""
+    by_q, by_v, by_a = (slope[place, : lag[0].shape[-1]] for slope in link_slopes(signals, joint))
+    rotor = signals.scene.robot.row_scale[joint] * signals.scene.armature(joint) if place == joint else 0.0
     return np.asarray(rotor * lag[2] - (by_q * lag[0] + by_v * lag[1] + by_a * lag[2]))
 
 
@@ -353,30 +351,30 @@ def held_link_inertia(signals: Signals, joint: int) -> Array:
 
 def usual_link_inertia(scene: Scene, joint: int) -> float:
     """Return the mean of `link_inertia` over poses within a turn or a metre, at the joint; negative where misjudged."""
-    return float(np.mean(_moved_inertia(scene, joint))) - scene.armature(joint)
+    return float(np.mean(moved_inertia(scene, joint, joint))) - scene.armature(joint)
 
 
 def usual_link_inertia_slopes(scene: Scene, joint: int) -> Array:
     """Return the derivatives of `usual_link_inertia` by the parameters of the rigid bodies, shape (p,)."""
-    moved = np.mean(_inertia_columns(scene.model.rigid_body, joint), axis=0)
+    moved = np.mean(_inertia_columns(scene.model.rigid_body, joint, joint), axis=0)
     return np.asarray(moved - scene.armature_slopes(joint))
 
 
 def largest_armature(scene: Scene, joint: int) -> float:
     """Return the armature that would leave the link no inertia in its most folded pose; infinite where misjudged."""
-    moved = _moved_inertia(scene, joint)
+    moved = moved_inertia(scene, joint, joint)
     least = float(np.min(moved))
     return least if least > LEAST_FOLDED * float(np.mean(moved)) > 0.0 else np.inf
 
 
-def _moved_inertia(scene: Scene, joint: int) -> Array:
-    """Return the inertia that a joint moves with its rotor, the others held, over 40 poses, at the joint, shape (40,)."""
+def moved_inertia(scene: Scene, place: int, joint: int) -> Array:
+    """Return the torque at one joint per acceleration of another or its own with the rotor, over 40 poses, shape (40,)."""
     term = scene.model.rigid_body
-    return np.asarray(_inertia_columns(term, joint) @ scene.value[scene.model.place(term)])
+    return np.asarray(_inertia_columns(term, place, joint) @ scene.value[scene.model.place(term)])
 
 
-@lru_cache(maxsize=32)
-def _inertia_columns(term: RigidBody, joint: int) -> Array:
+@lru_cache(maxsize=64)
+def _inertia_columns(term: RigidBody, place: int, joint: int) -> Array:
     """Return that inertia per parameter of the rigid bodies, shape (40, p)."""
     robot = term.robot
     reach = np.where(robot.prismatic, 1.0, np.pi)[:, None]
@@ -384,7 +382,7 @@ def _inertia_columns(term: RigidBody, joint: int) -> Array:
     rest, pushed = np.zeros_like(q), np.zeros_like(q)
     pushed[joint] = 1.0
     still, moved = (Motion("poses", "poses", np.arange(40.0), q, rest, a, None, 1.0) for a in (rest, pushed))
-    return np.asarray((term.regressor(moved) - term.regressor(still))[joint].T / robot.row_scale[joint])
+    return np.asarray((term.regressor(moved) - term.regressor(still))[place].T / robot.row_scale[place])
 
 
 def guessed_armatures(scene: Scene) -> dict[int, float]:

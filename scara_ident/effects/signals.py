@@ -59,6 +59,8 @@ class Scene:
         The base model's columns on motions where they are at hand, see `TorqueModel.joint_columns`.
     link_torques : tuple of LinkTorque
         Of the effects in the model beside the base model, which gears transmit too.
+    together : tuple of (Effect, Member)
+        Effects in the model whose members act together, see `Effect.together`, in the order of their joints.
     """
 
     model: TorqueModel
@@ -72,6 +74,7 @@ class Scene:
     armatures: Mapping[int, float] = field(default_factory=dict)
     columns: Mapping[Motion, tuple[Array, ...]] = field(default_factory=dict, repr=False)
     link_torques: tuple[LinkTorque, ...] = ()
+    together: tuple[tuple[Effect, Member], ...] = ()
 
     @property
     def robot(self) -> Robot:

@@ -1,21 +1,23 @@
-"""Two masses at one joint: the motor moves as recorded, and the link behind its elastic gear follows.
+"""Two masses at each elastic joint: its motor moves as recorded, and the link behind its gear follows.
 
-With the link's position q and the motor's theta, the lag x = theta - q follows from the link's row of the equations of
+With the links' positions q and the motors' theta, the lags x = theta - q follow from the links' rows of the equations of
 motion (Spong 1987),
 
-    tau_j(q, q', q'') = k x + d x'
+    tau_j(q, q', q'') = k_j x_j + d_j x_j'
 
-where tau_j is the torque that the gear passes on to the links. Given the rigid bodies, stiffness and damping this is an
-ordinary differential equation for x under the recorded motion of all motors. It holds below, at and above the frequency
-sqrt(k / inertia), at which the link swings while its motor is held. It is solved by Newton's method, each step of which is
-linear in x; so are its derivatives by the parameters of the rigid bodies.
+where tau_j is the torque that the gear of joint j passes on to the links. Given the rigid bodies, stiffness and damping these
+are ordinary differential equations for the lags of all elastic joints under the recorded motion of all motors: what one link
+lags loads the gears of the others, and one after the other they could not be solved, as near a resonance the lags would grow
+from turn to turn. They hold below, at and above the frequency sqrt(k / inertia), at which a link swings while its motor is
+held. They are solved by Newton's method, each step of which is linear in the lags; so are their derivatives by the parameters.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,180 +27,280 @@ from scara_ident.effects.links import (
     behind,
     held_link_inertia,
     lagging,
+    lagging_at,
     lagging_slopes,
     link_slopes,
+    moved_inertia,
     on_links_at,
-    own_lagging,
     rigid_torque,
+    shared,
     usual_link_inertia,
     usual_link_inertia_slopes,
 )
-from scara_ident.effects.signals import Signals
+from scara_ident.effects.parameters import Member
+from scara_ident.effects.signals import Scene, Signals
+from scara_ident.effects.swing import InitialState, Lag, Swing, free_swings, times
 from scara_ident.model.terms import joint_rows
-from scara_ident.motion.low_pass import low_pass
 from scara_ident.motion.motion import Motion
 
 # Newton's steps, the first from no lag: each squares the error, which for the first is the lag itself in rad.
 STEPS = 2
 # Of a smaller lag, rad or m, what is of second order is this share of its torque and is left out, which saves most of the time.
 SMALL_LAG = 5e-3
-# Radians of the free swing per sample up to which the scheme of fourth order is taken; it is stable up to 2.45.
-FINE_STEP = 2.0
 # Gravity does not take away more than the rest of a gear's stiffness.
 LEAST_SPRING = 0.1
-# A swing at the beginning that is seen with less than this share of the other one's strength is not looked for.
-UNSEEN = 1e-3
-# It is followed until no more than this share is left of it, and then for so many periods of the band.
+# The links' mass matrix, scaled to a diagonal of 1, has no smaller eigenvalue, however poor the estimate.
+LEAST_EIGENVALUE = 0.01
+# A swing at the beginning is followed until no more than this share is left of it, and then for so many periods of the band.
 FADED, FADED_PERIODS = 1e-9, 8.0
 
-Lag = tuple[Array, Array, Array]
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, eq=False)
 class TwoMasses:
-    """A joint's motor and link on a stretch of motion.
+    """Motors and links of m joints on a stretch of motion.
 
     Attributes
     ----------
-    frequency : float
-        Of the link against its held motor, Hz: with its usual inertia it is the square root of stiffness over inertia.
-    damping_ratio : float
-        Of that swinging.
+    members : tuple of Member
+        Of each joint, in their order, the frequency in Hz of its link against its held motor, which with the link's usual
+        inertia is the square root of stiffness over inertia, and the damping ratio of that swinging. Usual inertias are above 0.
     """
 
     signals: Signals
-    joint: int
-    frequency: float
-    damping_ratio: float
+    members: tuple[Member, ...]
 
     @cached_property
-    def inertia(self) -> float:
-        """Usual inertia of the link, at the joint; not above 0 where misjudged."""
-        return usual_link_inertia(self.signals.scene, self.joint)
+    def joints(self) -> list[int]:
+        """Their places."""
+        return [member.place for member in self.members]
+
+    @cached_property
+    def inertia(self) -> Array:
+        """Usual inertia of each link, at the joint, shape (m,)."""
+        return np.array([usual_link_inertia(self.signals.scene, joint) for joint in self.joints])
+
+    @cached_property
+    def _turning(self) -> Array:
+        """Frequency, rad/s, of each, shape (m,)."""
+        return 2.0 * np.pi * np.array([member.nonlinear[0] for member in self.members])
+
+    @cached_property
+    def _ratio(self) -> Array:
+        return np.array([member.nonlinear[1] for member in self.members])
 
     @property
-    def stiffness(self) -> float:
-        """N m/rad or N/m, at the joint."""
-        return self.inertia * (2.0 * np.pi * self.frequency) ** 2
+    def stiffness(self) -> Array:
+        """N m/rad or N/m, at the joint, shape (m,)."""
+        return self.inertia * self._turning**2
 
     @property
-    def damping(self) -> float:
-        """N m s/rad or N s/m, at the joint."""
-        return 4.0 * np.pi * self.damping_ratio * self.frequency * self.inertia
+    def damping(self) -> Array:
+        """N m s/rad or N s/m, at the joint, shape (m,)."""
+        return 2.0 * self._ratio * self._turning * self.inertia
+
+    @cached_property
+    def _scale(self) -> Array:
+        return np.asarray(self.signals.scene.robot.row_scale[self.joints])
+
+    @cached_property
+    def _armature(self) -> Array:
+        return np.array([self.signals.scene.armature(joint) for joint in self.joints])
 
     @cached_property
     def _slopes(self) -> Lag:
-        """Derivatives of the torque of the links by position, velocity and acceleration, at the joint, each (N,)."""
-        signals, j = self.signals, self.joint
-        by_q, by_v = (slope[j] / signals.scene.robot.row_scale[j] for slope in link_slopes(signals, j)[:2])
-        return by_q, by_v, held_link_inertia(signals, j)
+        """Derivatives of the torque of the links by their positions, velocities and accelerations, each (m, m, N)."""
+        signals, own = self.signals, self.joints
+        each = [link_slopes(signals, joint) for joint in own]
+        by_q, by_v, by_a = (
+            np.stack([slopes[k][own] / self._scale[:, None] for slopes in each], axis=1) for k in range(3)
+        )
+        for a, joint in enumerate(own):
+            by_a[a, a] = held_link_inertia(signals, joint)
+        return by_q, by_v, _definite(by_a)
 
-    @cached_property
+    @property
     def swing(self) -> Swing:
-        """The equation for x about no lag."""
-        by_q, by_v, by_a = self._slopes
-        spring = np.maximum(self.stiffness + by_q, LEAST_SPRING * self.stiffness)
-        # Coriolis torques of a poor estimate must not feed the swing.
-        damping = np.maximum(self.damping + by_v, 0.0)
-        return Swing(by_a, damping, spring, 1.0 / self.signals.motion.rate)
+        """The equations for the lags about no lag."""
+        return self._kept("swing", self._made_swing)
 
-    @cached_property
+    def _made_swing(self) -> Swing:
+        spring, damping, inertia = (part.copy() for part in self._slopes)
+        for a, (k, d) in enumerate(zip(self.stiffness, self.damping, strict=True)):
+            spring[a, a] = np.maximum(k + spring[a, a], LEAST_SPRING * k)
+            # Coriolis torques of a poor estimate must not feed the swing.
+            damping[a, a] = np.maximum(d + damping[a, a], 0.0)
+        return Swing(inertia, damping, spring, 1.0 / self.signals.motion.rate)
+
+    @property
     def lag(self) -> Lag:
-        """Motor less link, and its first two derivatives, each (N,)."""
-        links = self.signals.rigid[self.joint] + self.signals.on_links[self.joint]
-        lag = self._settled(self._load(links, self.signals.motion.a[self.joint]))
-        recorded = self.signals.motion.torque
+        """Motors less links, and their first two derivatives, each (m, N)."""
+        return self._kept("lag", self._made_lag)
+
+    def _made_lag(self) -> Lag:
+        signals, own = self.signals, self.joints
+        lag = self._settled(self._load(signals.rigid[own] + signals.on_links[own], signals.motion.a[own]))
+        recorded = signals.motion.torque
         if self._initial is not None and recorded is not None:
-            signals, j = self.signals, self.joint
-            left = recorded[j] - signals.predicted[j] - signals.on_links[j] - own_lagging(signals, j, lag)
+            left = recorded[own] - signals.predicted[own] - signals.on_links[own] - self._on_own(lag)
             lag = self._initial.added(lag, self._initial.state(left, (lag[0], lag[1])))
         for _ in range(0 if _small(lag) else STEPS - 1):
-            moved = behind(self.signals.motion, self.joint, lag)
-            load = self._load(self._torque(moved)[self.joint], moved.a[self.joint])
-            by_q, by_v, by_a = self._slopes
-            lag = self.swing.solve(load + by_q * lag[0] + by_v * lag[1] + by_a * lag[2], lag[0][:2])
+            moved = self._behind(lag, len(own))
+            load = self._load(self._torque(moved)[own], moved.a[own])
+            for slopes, part in zip(self._slopes, lag, strict=True):
+                load += times(slopes, part)
+            lag = self.swing.solve(load, lag[0][:, :2])
+            if self._initial is not None and recorded is not None:
+                left = recorded[own] - signals.predicted[own] - signals.on_links[own] - self._changed(lag)[own]
+                lag = self._initial.added(lag, self._initial.state(left, (lag[0], lag[1])))
         return lag
 
     def _settled(self, torque: Array) -> Lag:
-        """Return the lags under torques (..., N), from rest where the swing at the beginning is looked for.
+        """Return the lags under torques (..., m, N), from rest where the swing at the beginning is looked for.
 
         Their first samples come from filtered positions of which nobody knows what was before, and may assume any speed.
         """
         if self._initial is None:
             return self.swing.solve(torque)
-        return self.swing.solve(torque, np.repeat(torque[..., :1] / self.swing.stiffness[0], 2, axis=-1))
+        return self.swing.solve(torque, np.repeat(self.swing.static(torque[..., :1]), 2, axis=-1))
 
-    @cached_property
+    @property
     def _initial(self) -> InitialState | None:
-        """What the recorded torque says of how the link swung when the recording began; None where none was recorded."""
-        signals, j = self.signals, self.joint
-        trim = int(np.ceil(signals.motion.rate / signals.scene.band))
-        if signals.motion.torque is None or signals.motion.samples <= 4 * trim:
-            return None
-        count = self.swing.memory(FADED) + int(FADED_PERIODS * signals.motion.rate / signals.scene.band)
-        count = max(min(count, signals.motion.samples), 4 * trim)
-        free = self.swing.solve(np.zeros((2, count)), np.array([[1.0, 1.0], [0.0, self.swing.step]]))
-        return InitialState(
-            free,
-            own_lagging(signals, j, free),
-            signals.motion.rate,
-            signals.scene.band,
-            slice(trim, min(count, signals.motion.samples - trim)),
-        )
+        """What the recorded torque says of how links swung when the recording began; None where none was recorded."""
+        return self._kept("initial state", self._made_initial)
 
-    @cached_property
+    def _made_initial(self) -> InitialState | None:
+        motion, band = self.signals.motion, self.signals.scene.band
+        trim = int(np.ceil(motion.rate / band))
+        if motion.torque is None or motion.samples <= 4 * trim:
+            return None
+        count = self.swing.memory(FADED) + int(FADED_PERIODS * motion.rate / band)
+        count = max(min(count, motion.samples), 4 * trim)
+        free = free_swings(self.swing, count)
+        size = np.std(motion.torque[self.joints], axis=1)
+        weights = np.where(size > 0.0, 1.0 / np.where(size > 0.0, size, 1.0), 0.0) if len(size) > 1 else np.ones(1)
+        used = slice(trim, min(count, motion.samples - trim))
+        return InitialState(free, self._on_own(free), weights, motion.rate, band, used)
+
+    @property
     def change(self) -> Array:
-        """Torque of all joints less that with a rigid gear, recorded side, shape (n, N)."""
-        scene, j = self.signals.scene, self.joint
+        """Torque of all joints less that with rigid gears, recorded side, shape (n, N)."""
+        return self._kept("change", self._made_change)
+
+    def _made_change(self) -> Array:
         if _small(self.lag):
-            return lagging(self.signals, j, self.lag)
-        result = self._torque(behind(self.signals.motion, self.joint, self.lag)) - self.signals.rigid
-        result -= self.signals.on_links
-        result[j] += scene.robot.row_scale[j] * scene.armature(j) * self.lag[2]
+            return np.asarray(sum(self.parts))
+        return self._changed(self.lag)
+
+    def _changed(self, lag: Lag) -> Array:
+        """Return what lags change of all torques, of all orders."""
+        result = self._torque(self._behind(lag, len(self.joints))) - self.signals.rigid - self.signals.on_links
+        result[self.joints] += (self._scale * self._armature)[:, None] * lag[2]
         return np.asarray(result)
 
-    def slopes(self) -> Iterator[tuple[NDArray[np.intp], Array]]:
-        """Give of each joint the derivatives of stiffness times `change`, over the stiffness, see `Effect.slopes`.
+    @property
+    def parts(self) -> list[Array]:
+        """What each link adds to `change` once those before it lag too, recorded side, shape (n, N) each."""
+        return self._kept("parts", self._made_parts)
 
-        They are by the parameters of the rigid bodies, by the armature where these do not tell it, by the frequency and by
-        the damping ratio.
+    def _made_parts(self) -> list[Array]:
+        x, first, second = self.lag
+        if _small(self.lag):
+            return [lagging(self.signals, j, (x[a], first[a], second[a])) for a, j in enumerate(self.joints)]
+        found, before = [], self.signals.rigid + self.signals.on_links
+        for a, j in enumerate(self.joints):
+            torque = self._torque(self._behind(self.lag, a + 1))
+            found.append(torque - before)
+            found[a][j] += self._scale[a] * self._armature[a] * second[a]
+            before = torque
+        return found
+
+    def slopes(self, place: int) -> Iterator[tuple[NDArray[np.intp], Array]]:
+        """Give of each joint derivatives of what all links do to its torque, see `Effect.slopes`, for the member of a place.
+
+        They are by its armature where the bodies do not tell it, its frequency and its damping ratio, and with the first
+        member by the parameters of the rigid bodies. To them comes what its coefficient takes away in turn, see `Tie`: so
+        the sums over all members are the derivatives of `change`, whatever is shared out between them.
         """
-        scene, motion, j = self.signals.scene, self.signals.motion, self.joint
-        term, scale = scene.model.rigid_body, scene.robot.row_scale[j]
-        moved, (x, first, second) = behind(motion, j, self.lag), self.lag
-        bodies = joint_rows(term, moved)
-        own = np.flatnonzero(term.pattern[j])
-        p = term.pattern.shape[1]
-        rotor, usual, share = np.zeros((3, p + 3))
-        rotor[: p + 1] = *scene.armature_slopes(j), 1.0
-        usual[: p + 1] = *usual_link_inertia_slopes(scene, j), -1.0
-        share[: p + 1], share[p + 1] = usual[: p + 1] / self.inertia, 2.0 / self.frequency
-        acting = np.union1d(own, np.append(np.flatnonzero((rotor != 0.0) | (usual != 0.0)), [p + 1, p + 2]))
-        omega, ratio = 2.0 * np.pi * self.frequency, self.damping_ratio
-        right = -rotor[acting, None] * moved.a[j] - usual[acting, None] * (omega**2 * x + 2.0 * ratio * omega * first)
-        right[np.searchsorted(acting, own)] += bodies[j] / scale
-        right[-2] = -4.0 * np.pi * self.inertia * (omega * x + ratio * first)
-        right[-1] = -2.0 * omega * self.inertia * first
+        scene, motion, own = self.signals.scene, self.signals.motion, self.joints
+        term, carrier = scene.model.rigid_body, place == 0
+        p, (x, first, second) = term.pattern.shape[1], self.lag
+        moved = self._behind(self.lag, len(own))
+        bodies = joint_rows(term, moved) if carrier else []
+        rotors, usual = np.zeros((2, len(own), p + 3))
+        share = np.zeros(p + 3)
+        share[:p] = usual_link_inertia_slopes(scene, own[place])
+        share[p], share[p + 1] = -1.0, 2.0 * self.inertia[place] / self.members[place].nonlinear[0]
+        share /= self.inertia[place]
+        rotors[place, p], usual[place, p] = 1.0, -1.0
+        if carrier:
+            rotors[:, :p] = [scene.armature_slopes(joint) for joint in own]
+            usual[:, :p] = [usual_link_inertia_slopes(scene, joint) for joint in own]
+        columns = [np.flatnonzero(term.pattern[joint]) for joint in own] if carrier else []
+        acting = np.flatnonzero(np.any((rotors != 0.0) | (usual != 0.0), axis=0))
+        acting = np.unique(np.concatenate([acting, *columns, [p + 1, p + 2]]))
+        # Torques that the parameters put into the gears, and directly into the joints' torque.
+        turning, ratio = self._turning, self._ratio
+        right, direct = np.zeros((2, len(acting), len(own), motion.samples))
+        for a, joint in enumerate(own):
+            turned, held = rotors[a, acting, None], usual[a, acting, None]
+            right[:, a] = -turned * moved.a[joint] - held * (
+                turning[a] ** 2 * x[a] + 2.0 * ratio[a] * turning[a] * first[a]
+            )
+            direct[:, a] = self._scale[a] * turned * second[a]
+            if carrier:
+                at = np.searchsorted(acting, columns[a])
+                right[at, a] += bodies[joint] / self._scale[a]
+        inertia = self.inertia[place]
+        right[-2, place] = -4.0 * np.pi * inertia * (turning[place] * x[place] + ratio[place] * first[place])
+        right[-1, place] = -2.0 * turning[place] * inertia * first[place]
         lags = self._settled(right)
         begun = None
         if self._initial is not None:
             # The swing at the beginning is fitted again whatever the parameters are.
-            count = self._initial.count
-            whole = own_lagging(self.signals, j, (lags[0][:, :count], lags[1][:, :count], lags[2][:, :count]))
-            whole[np.searchsorted(acting, own)] += bodies[j][:, :count]
-            whole += scale * rotor[acting, None] * second[:count]
-            free = self._initial.free
-            added = [lagging(self.signals, j, (free[0][k], free[1][k], free[2][k])) for k in range(2)]
-            begun = self._initial.state(whole, (x, first)), np.array(added)
-        for joint, (places, rows) in enumerate(lagging_slopes(self.signals, j, bodies, acting, lags)):
-            change = share[acting, None] * self.change[joint]
-            if joint == j:
-                change += scale * rotor[acting, None] * second
+            count, free = self._initial.count, self._initial.free
+            whole = self._on_own((lags[0][..., :count], lags[1][..., :count], lags[2][..., :count]))
+            whole += direct[..., :count]
+            for a, at in enumerate(columns):
+                whole[np.searchsorted(acting, at), a] += bodies[own[a]][:, :count]
+            added = np.array([
+                sum(lagging(self.signals, j, (free[0][k, a], free[1][k, a], free[2][k, a])) for a, j in enumerate(own))
+                for k in range(len(free[0]))
+            ])  # fmt: skip
+            begun = self._initial.state(whole, (x, first)), added
+        shared_out = np.flatnonzero(share)
+        each = [(lags[0][:, a], lags[1][:, a], lags[2][:, a]) for a in range(len(own))]
+        for joint, (found, rows) in enumerate(lagging_slopes(self.signals, own, bodies, acting, each)):
+            places = np.union1d(found, shared_out)
+            result = rows
+            if len(places) > len(found):
+                result = np.zeros((len(places), motion.samples))
+                result[np.searchsorted(places, found)] = rows
+            at = np.searchsorted(places, acting)
+            if joint in own:
+                result[at] += direct[:, own.index(joint)]
             if begun is not None:
                 state, torque = begun
-                change[:, : torque.shape[-1]] -= state @ torque[:, joint]
-            rows[np.searchsorted(places, acting)] += change
-            yield places, rows
+                result[at, : torque.shape[-1]] -= state @ torque[:, joint]
+            result[np.searchsorted(places, shared_out)] += share[shared_out, None] * self.parts[place][joint]
+            yield places, result
+
+    def _on_own(self, lag: Lag) -> Array:
+        """Return what lags (..., m, N) change of their own joints' torques, to first order, recorded side, (..., m, N)."""
+        result = np.zeros(lag[0].shape)
+        for b, joint in enumerate(self.joints):
+            own = lag[0][..., b, :], lag[1][..., b, :], lag[2][..., b, :]
+            for a, other in enumerate(self.joints):
+                result[..., a, :] += lagging_at(self.signals, other, joint, own)
+        return result
+
+    def _behind(self, lag: Lag, count: int) -> Motion:
+        """Return the motion with so many of the links in place of their motors."""
+        motion = self.signals.motion
+        for a, joint in enumerate(self.joints[:count]):
+            motion = behind(motion, joint, (lag[0][a], lag[1][a], lag[2][a]))
+        return motion
 
     def _torque(self, motion: Motion) -> Array:
         state = (motion.q, motion.v, motion.a)
@@ -206,145 +308,40 @@ class TwoMasses:
         return found + on_links_at(self.signals, *state) if self.signals.scene.link_torques else found
 
     def _load(self, torque: Array, acceleration: Array) -> Array:
-        """Return the torque that the gear passes on, at the joint, of that with the rotor on the link."""
-        scene, j = self.signals.scene, self.joint
-        return np.asarray(torque / scene.robot.row_scale[j] - scene.armature(j) * acceleration)
+        """Return the torques (m, N) that the gears pass on, at the joints, of those with the rotors on the links."""
+        return np.asarray(torque / self._scale[:, None] - self._armature[:, None] * acceleration)
+
+    def _kept(self, name: str, make: Callable[[], T]) -> T:
+        """Return what every member of a model asks for, made once for the signals; of a candidate nobody asks again."""
+        if self.members == tuple(member for _, member in self.signals.scene.together):
+            return shared(self.signals, (name, self.members), make)
+        held: dict[str, T] = self.__dict__.setdefault("_own", {})
+        if name not in held:
+            held[name] = make()
+        return held[name]
+
+
+def usual_coupling(scene: Scene, joint: int, other: int) -> float:
+    """Return the inertia that two links share over the mean of their own, rms over poses; 0 where misjudged."""
+    own = usual_link_inertia(scene, joint), usual_link_inertia(scene, other)
+    if not min(own) > 0.0:
+        return 0.0
+    return float(np.sqrt(np.mean(moved_inertia(scene, joint, other) ** 2) / (own[0] * own[1])))
 
 
 def _small(lag: Lag) -> bool:
     return bool(np.max(np.abs(lag[0])) < SMALL_LAG)
 
 
-@dataclass(frozen=True, eq=False)
-class InitialState:
-    """How a link swung when a recording began, as far as the torque of its joint says.
-
-    Attributes
-    ----------
-    free : tuple of ndarray, each of shape (2, M)
-        x and its derivatives after a unit of x, and of its derivative, at the first sample; after M samples it has faded.
-    torque : ndarray, shape (2, M)
-        What they add to the torque of the joint.
-    rate, band : float
-        Hz; the torque is looked at within the band.
-    used : slice
-        Samples away from the ends, where the continuation of filtered signals is a guess.
-    """
-
-    free: Lag
-    torque: Array
-    rate: float
-    band: float
-    used: slice
-
-    @property
-    def count(self) -> int:
-        """Samples M."""
-        return int(self.torque.shape[-1])
-
-    @cached_property
-    def _seen(self) -> Array:
-        return low_pass(self.torque, self.rate, self.band)[:, self.used]
-
-    def state(self, torque: Array, lag: tuple[Array, Array]) -> Array:
-        """Return x and its derivative, beside those assumed, that explain a torque of the joint.
-
-        Parameters
-        ----------
-        torque : ndarray, shape (..., N)
-            Of which the first M samples are taken.
-        lag : tuple of ndarray, shape (N,)
-            x and its derivative, as large as which a swing at the beginning may be.
-
-        Returns
-        -------
-        ndarray, shape (..., 2)
-        """
-        left = low_pass(torque[..., : self.count], self.rate, self.band)[..., self.used]
-        sizes = np.array([np.mean(part**2) for part in lag])
-        normal = self._seen @ self._seen.T
-        # What cannot be seen stays as assumed.
-        normal += np.diag(UNSEEN * np.trace(normal * sizes) / sizes)
-        told = np.linalg.inv(normal)
-        # Once more on what that leaves: of what is seen a thousandth would stay as assumed, for as long as it swings.
-        once = left @ self._seen.T @ told
-        return np.asarray(once + (left - once @ self._seen) @ self._seen.T @ told)
-
-    def added(self, lag: Lag, state: Array) -> Lag:
-        """Return x and its derivatives with the swing that a state at the first sample makes."""
-        x, first, second = (part.copy() for part in lag)
-        for part, own in zip((x, first, second), self.free, strict=True):
-            part[: self.count] += state @ own
-        return x, first, second
-
-
-@dataclass(frozen=True, eq=False)
-class Swing:
-    """The equation ``inertia x'' + damping x' + stiffness x = torque`` at uniform samples.
-
-    Attributes
-    ----------
-    inertia, damping, stiffness : ndarray, shape (N,)
-    step : float
-        s per sample.
-    """
-
-    inertia: Array
-    damping: Array
-    stiffness: Array
-    step: float
-
-    def solve(self, torque: Array, start: Array | None = None) -> Lag:
-        """Return x, its derivative and its second derivative.
-
-        Parameters
-        ----------
-        torque : ndarray, shape (..., N)
-            N at least 3; may be of the first samples alone.
-        start : ndarray, shape (..., 2), optional
-            x at the first two samples, by default the static x.
-
-        Returns
-        -------
-        tuple of ndarray, each of that shape
-
-        Notes
-        -----
-        Newmark's method as one banded triangular system: the scheme of Fox and Goodwin, of fourth order in the frequency,
-        where it is stable, else the constant mean acceleration, which always is (Hughes, The Finite Element Method, 2000,
-        section 9.1).
-        """
-        from scipy.linalg.lapack import dtbtrs
-
-        shape, (beta, bands) = np.shape(torque), self._system
-        inertia, damping, stiffness = (part[: shape[-1]] for part in (self.inertia, self.damping, self.stiffness))
-        rows = np.reshape(torque, (-1, shape[-1]))
-        right = np.empty(rows.shape)
-        right[:, :2] = rows[:, :2] / self.stiffness[:2] if start is None else np.reshape(start, (-1, 2))
-        right[:, 2:] = beta * (rows[:, 2:] + rows[:, :-2]) + (1.0 - 2.0 * beta) * rows[:, 1:-1]
-        # Row after row: a solver that exchanges rows takes five times as long and loses digits to the length of the run.
-        x = np.asarray(dtbtrs(bands[:, : shape[-1]], right.T, uplo="L", overwrite_b=True)[0]).T
-        first = np.gradient(x, self.step, axis=1)
-        second = (rows - damping * first - stiffness * x) / inertia
-        return x.reshape(shape), first.reshape(shape), second.reshape(shape)
-
-    def memory(self, share: float) -> int:
-        """Return after how many samples no more than a share is left of a free swing; all if it does not fade so far."""
-        # An overdamped link creeps back at no less than the stiffness over the damping.
-        swinging, creeping = self.damping * self.stiffness, 2.0 * self.inertia * self.stiffness
-        fading = swinging / np.maximum(creeping, self.damping**2)
-        return int(np.searchsorted(np.cumsum(fading) * self.step, -np.log(share)))
-
-    @cached_property
-    def _system(self) -> tuple[float, Array]:
-        """Newmark's beta, and the diagonals of the triangular system, shape (3, N)."""
-        fastest = float(np.max(self.stiffness / self.inertia)) * self.step**2
-        beta = 1.0 / 12.0 if fastest < FINE_STEP**2 else 0.25
-        heavy, slow = self.inertia[1:-1] / self.step**2, self.damping[1:-1] / (2.0 * self.step)
-        spring = self.stiffness[1:-1]
-        bands = np.ones((3, len(self.inertia)), order="F")
-        bands[0, 2:] = heavy + slow + beta * spring
-        bands[1, 1:-1] = -2.0 * heavy + (1.0 - 2.0 * beta) * spring
-        bands[1, 0] = 0.0
-        bands[2, :-2] = heavy - slow + beta * spring
-        return beta, bands
+def _definite(inertia: Array) -> Array:
+    """Return mass matrices (m, m, N) that are positive definite, their diagonals as they are."""
+    if len(inertia) == 1:
+        return inertia
+    size = np.sqrt(np.einsum("iin->in", inertia))
+    scaled = np.moveaxis(inertia / (size[:, None] * size), 2, 0)
+    least = np.linalg.eigvalsh(scaled)[:, 0]
+    factor = np.where(least < LEAST_EIGENVALUE, (1.0 - LEAST_EIGENVALUE) / (1.0 - np.minimum(least, 0.5)), 1.0)
+    result = inertia * factor
+    for a in range(len(inertia)):
+        result[a, a] = inertia[a, a]
+    return np.asarray(result)

@@ -227,8 +227,9 @@ def _robot(entry: Mapping[str, Any], path: Path) -> Robot:
 def _scene_entry(scene: Scene) -> dict[str, Any]:
     numbers = {name: getattr(scene, name) for name in ("value", "duration", "rate", "band", "travel", "speed", "start")}
     on_links = [_effect_entry(item.effect, item.member) | {"value": list(item.value)} for item in scene.link_torques]
+    together = [_effect_entry(effect, member) for effect, member in scene.together]
     armatures = {str(joint): value for joint, value in scene.armatures.items()}
-    return numbers | {"armatures": armatures, "on_links": on_links}
+    return numbers | {"armatures": armatures, "on_links": on_links, "together": together}
 
 
 def _effect_entry(effect: Effect, member: Member) -> dict[str, Any]:
@@ -258,6 +259,7 @@ def _with_effects(base: TorqueModel, known: Mapping[str, Any], path: Path) -> To
         link_torques=tuple(
             LinkTorque(_family(item, path), _member(item), tuple(item["value"])) for item in entry.get("on_links", ())
         ),
+        together=tuple((_family(item, path), _member(item)) for item in entry.get("together", ())),
     )
     terms = [EffectTerm(_family(item, path), _member(item), scene) for item in known["effects"]]
     return TorqueModel(base.name, base.robot, (*base.terms, *terms))

@@ -10,13 +10,17 @@ import numpy as np
 import pytest
 
 from scara_ident.diagnosis.candidates import Candidate
-from scara_ident.diagnosis.choice import _left_again, _sure_once_refined, _worth_fitting, fitted_beside
+from scara_ident.diagnosis.choice import _left_again, _sure_once_refined, _worth_fitting, choose, fitted_beside
 from scara_ident.diagnosis.criteria import CRITERIA
+from scara_ident.diagnosis.nonlinear_fit import tune
+from scara_ident.diagnosis.selection_step import moved_together
 from scara_ident.effects import Member
+from scara_ident.effects.elasticity import JointElasticity
 from scara_ident.effects.friction import Stribeck
 from scara_ident.effects.measurement import TimeDelay, shifted
 from scara_ident.effects.position import Spring
-from tests.diagnosis.made import exact_runs, step_beside, with_torque
+from scara_ident.simulation import parse_effect, simulate, virtual_arm
+from tests.diagnosis.made import NOISE, exact_runs, multisine, step_beside, with_torque
 
 
 def test_what_is_sure_only_beside_its_grid_point_is_refined_before_it_is_refused():
@@ -99,3 +103,20 @@ def test_little_of_a_delay_is_left_once_it_is_taken_out(left: float, there: bool
     # Of what stays in the model nothing is taken out.
     (spring,) = step.judge([Candidate(Spring(), Member(1))])
     assert _left_again(step, spring) is None
+
+
+@pytest.mark.slow
+def test_a_gear_that_took_up_what_two_do_gives_way_to_both():
+    arm, family = replace(virtual_arm(), torque_noise=np.array(NOISE)), JointElasticity()
+    effects = [parse_effect(f"joint_elasticity:{j}:stiffness={k}") for j, k in (("joint1", 6000), ("joint2", 1500))]
+    runs = [simulate(arm, multisine(f"F{k}", k, 9.0), effects=effects, seed=k, rate=500.0).recording for k in (1, 2, 3)]
+    step = tune(step_beside(runs, [Candidate(family, Member(0, (6.0, 0.1)))], bands=(15.0, 15.0)))
+    (alone,) = step.chosen
+    # Below that of the gear that is there, 7.2 Hz.
+    assert alone.member.nonlinear[0] < 6.5
+    decisions = step.judge([Candidate(family, member) for member in family.members(step.scene) if member.joint == 1])
+    winner, _, scene = choose(step, decisions, None)
+    assert winner is not None and winner.candidate.member.joint == 1
+    both = tune(replace(step, scene=scene, chosen=(*moved_together(step.chosen, scene), winner.candidate)))
+    found = [1.0 / family.tie(both.scene, item.member).value for item in both.chosen]
+    assert found == pytest.approx([6000.0, 1500.0], rel=0.05)

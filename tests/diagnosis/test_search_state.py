@@ -13,6 +13,8 @@ from scara_ident.diagnosis.search import scene_of
 from scara_ident.diagnosis.search_state import SearchState
 from scara_ident.diagnosis.selection_step import SelectionStep
 from scara_ident.diagnosis.selection_step import observed as with_effects
+from scara_ident.effects import Member
+from scara_ident.effects.elasticity import JointElasticity
 from scara_ident.effects.friction import AsymmetricFriction
 from scara_ident.effects.measurement import TimeDelay, shifted
 from scara_ident.effects.position import Spring
@@ -113,3 +115,13 @@ def test_what_is_gone_back_to_holds_no_fit_and_not_the_columns_before_a_correcti
     other = state.to_go_back_to(decisions["time_delay"])
     assert other.step.columns is not state.step.columns
     assert other.step.observations is state.step.observations
+
+
+def test_at_another_estimate_members_that_act_together_are_as_they_were_fitted_there():
+    runs = exact_runs()
+    state = begun(runs, Spring())
+    first, second = (Candidate(JointElasticity(), Member(j, (9.0, 0.2))) for j in (0, 1))
+    state = replace(state, step=replace(state.step, chosen=(second, Candidate(Spring(), Member(0)), first)))
+    moved = replace(state.step, chosen=(first.at((7.0, 0.1)),)).scene
+    assert state.at(moved).step.chosen == (second, state.step.chosen[1], first.at((7.0, 0.1)))
+    assert state.at(state.step.scene) is state

@@ -18,6 +18,7 @@ from scara_ident.diagnosis.selection_step import (
 )
 from scara_ident.diagnosis.selection_step import observed as observed_with
 from scara_ident.effects import Member
+from scara_ident.effects.elasticity import JointElasticity
 from scara_ident.effects.friction import Stribeck
 from scara_ident.effects.gear import TransmissionLoss
 from scara_ident.effects.position import Spring
@@ -218,3 +219,31 @@ def test_a_step_that_is_left_forgets_its_twin_with_more_noise():
     step.lean()
     assert step.noisier is not twin
     assert_array_equal(step.noisier.model.root, twin.model.root)
+
+
+def test_the_scene_of_a_step_has_the_members_that_act_together_and_no_others():
+    family = JointElasticity()
+    first, second = (Candidate(family, Member(j, (9.0, 0.2))) for j in (0, 1))
+    spring = Candidate(Spring(), Member(0))
+    step = step_beside(exact_runs(), [second, spring, first])
+    assert step.scene.together == ((family, first.member), (family, second.member))
+    left = step.without(0)
+    assert left.scene.together == ((family, first.member),)
+    # Beside it the other is what it changes, with which both are what they are together.
+    apart = left.columns.rows(left.scene, [first, second])
+    both = step.columns.rows(step.scene, [first, second])
+    stiffness = [1.0 / family.tie(step.scene, item.member).value for item in (first, second)]
+    for joint in range(2):
+        whole = sum(rows[joint] / k for rows, k in zip(both, stiffness, strict=True))
+        assert_allclose(sum(rows[joint] / k for rows, k in zip(apart, stiffness, strict=True)), whole, atol=1e-9)
+    assert left.without(1).scene.together == ()
+
+
+def test_candidates_at_hand_that_act_together_with_effects_in_the_model_are_those_beside_them():
+    family = JointElasticity()
+    other = Candidate(family, Member(1, (9.0, 0.2)))
+    alone = step_beside(exact_runs(), [])
+    step = replace(alone, chosen=(Candidate(family, Member(0, (9.0, 0.2))),))
+    (beside,), (first,) = step.rows_at_hand(alone.scene, [other]), alone.rows_at_hand(alone.scene, [other])
+    assert np.abs(beside[0] - first[0]).max() > 0.01 * np.abs(first[0]).max()
+    assert_array_equal(beside[0], step.rows(step.scene, [other])[0][0])

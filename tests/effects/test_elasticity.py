@@ -7,12 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scara_ident.effects import Member, Signals
+from scara_ident.effects import Member, Scene, Signals
 from scara_ident.effects.elasticity import Backlash, JointElasticity
 from scara_ident.effects.links import lagging, usual_link_inertia
+from scara_ident.effects.two_mass import TwoMasses, usual_coupling
 from scara_ident.model.model import build_model
 from scara_ident.robot.robot import load_robot
 from scara_ident.simulation import parse_effect, simulate, virtual_arm
+from tests.arms import Array, example_urdf
 from tests.effects.scenes import columns, fit, moving, scene_of, wandering
 
 
@@ -69,3 +71,60 @@ def test_what_no_gear_can_have_is_refused():
     assert JointElasticity().inadmissible(replace(scene, band=20.0), Member(0, (30.0, 0.7)), soft, std) is None
     assert "negative" in str(Backlash().inadmissible(scene, Member(0, (1e-3,)), np.array([-1e-4]), std))
     assert "rattle" in str(Backlash().inadmissible(scene, Member(0, (1e-3,)), np.array([0.2]), std))
+
+
+def test_columns_of_members_in_the_model_add_up_and_that_of_another_is_what_it_changes_beside_them():
+    family, scene = JointElasticity(), scene_of(load_robot())
+    item = moving(scene.robot, 3.0)
+    members = Member(0, (6.0, 0.1)), Member(1, (5.0, 0.1))
+    first, both = (replace(scene, together=tuple((family, one) for one in members[:k])) for k in (1, 2))
+
+    def torque(beside: Scene, member: Member) -> Array:
+        (column,) = family.signal_columns(Signals(beside, item), member)
+        tie = family.tie(beside, member)
+        assert tie is not None
+        return tie.value * column
+
+    alone = torque(scene, members[0])
+    assert np.array_equal(torque(first, members[0]), alone)
+    whole = torque(both, members[0]) + torque(both, members[1])
+    beside = alone + torque(first, members[1])
+    assert np.abs(whole - beside).max() < 1e-9 * np.abs(whole).max()
+    # Of other parameters than those in the model it is a candidate in their place.
+    assert np.array_equal(torque(both, members[0]), torque(both, replace(members[0])))
+    other = torque(both, Member(0, (6.5, 0.1)))
+    assert np.abs(other + torque(replace(scene, together=both.together[1:]), members[1]) - whole).max() > 1e-3
+    assert np.abs(alone + torque(scene, members[1]) - whole).max() > 0.05 * np.abs(whole).max()
+
+
+def test_a_link_whose_inertia_is_misjudged_lags_nothing_and_loads_no_other():
+    family, scene = JointElasticity(), scene_of(load_robot())
+    value = scene.value.copy()
+    place = scene.model.place(scene.model.rigid_body)
+    value[place] *= -1.0
+    item, member = moving(scene.robot, 1.0), Member(1, (5.0, 0.1))
+    misjudged = replace(scene, value=value, together=((family, Member(0, (6.0, 0.1))), (family, member)))
+    assert not usual_link_inertia(misjudged, 1) > 0.0
+    (column,) = family.signal_columns(Signals(misjudged, item), member)
+    assert np.all(column == 0.0)
+
+
+def test_one_soft_gear_may_stand_for_two_of_links_that_share_their_inertia():
+    family, robot = JointElasticity(), load_robot(example_urdf("ur5_robot.urdf"))
+    scene, member = scene_of(robot), Member(1, (4.0, 0.03))
+    pairs = family.instead(scene, member)
+    # The elbow first, and not the pan, whose axis stands across that of the lift.
+    assert pairs[0][1].joint == 2 and all(one.joint == 1 and one.nonlinear == other.nonlinear for one, other in pairs)
+    assert 0 not in {other.joint for _, other in pairs}
+    both = pairs[0]
+    item = moving(robot, 0.1)
+    masses = TwoMasses(Signals(scene, item), both)
+    inertia = np.diag(masses.inertia)
+    inertia[0, 1] = inertia[1, 0] = usual_coupling(scene, 1, 2) * np.sqrt(masses.inertia[0] * masses.inertia[1])
+    slowest = np.sqrt(np.min(np.linalg.eigvals(np.linalg.solve(inertia, np.diag(masses.stiffness))).real)) / (
+        2.0 * np.pi
+    )
+    assert slowest == pytest.approx(4.0)
+    beside = replace(scene, together=((family, member), (family, Member(2, (9.0, 0.1)))))
+    assert 2 not in {other.joint for _, other in family.instead(beside, member)}
+    assert family.instead(replace(scene, value=-scene.value), member) == ()

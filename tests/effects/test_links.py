@@ -15,11 +15,11 @@ from scara_ident.effects.links import (
     gravity_columns,
     guessed_armatures,
     lagging,
+    lagging_at,
     largest_armature,
     link_inertia,
     link_slopes,
     on_links_at,
-    own_lagging,
     point_mass,
     rigid_slopes,
     rigid_torque,
@@ -49,8 +49,8 @@ def test_a_lagging_link_loads_all_joints_as_pinocchio_says(name: str):
     lag = (1e-3 * np.sin(w * item.time), 1e-3 * w * np.cos(w * item.time), -1e-3 * w**2 * np.sin(w * item.time))
     signals = Signals(scene, item)
     changed = lagging(signals, joint, lag)
-    assert_array_equal(own_lagging(signals, joint, lag), changed[joint])
-    twice = own_lagging(signals, joint, tuple(np.array([part[:9], 2.0 * part[:9]]) for part in lag))
+    assert_array_equal(lagging_at(signals, joint, joint, lag), changed[joint])
+    twice = lagging_at(signals, joint, joint, tuple(np.array([part[:9], 2.0 * part[:9]]) for part in lag))
     assert twice == pytest.approx(np.outer([1.0, 2.0], np.ones(9)) * changed[joint, :9])
     size = 1e-3
     ends = []

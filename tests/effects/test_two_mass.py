@@ -6,12 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.linalg import norm
 from scipy.integrate import solve_ivp
 
 from scara_ident.effects import Scene, Signals
-from scara_ident.effects.two_mass import InitialState, Swing, TwoMasses
+from scara_ident.effects.elasticity import JointElasticity
+from scara_ident.effects.links import usual_link_inertia
+from scara_ident.effects.parameters import Member
+from scara_ident.effects.two_mass import TwoMasses
 from scara_ident.motion.motion import Motion
-from scara_ident.robot.robot import load_robot
+from scara_ident.robot.robot import Robot, load_robot
 from tests.arms import Array
 from tests.effects.carried import carrying, heavier
 from tests.effects.scenes import dense, moving, scene_of
@@ -19,66 +23,9 @@ from tests.effects.scenes import dense, moving, scene_of
 STEP = 2e-3
 
 
-@pytest.mark.parametrize(("frequency", "step"), [(3.0, 5e-4), (40.0, 5e-4), (9.0, 1e-2), (30.0, 1e-2)])
-def test_a_forced_link_swings_as_the_closed_form_says(frequency: float, step: float):
-    inertia, stiffness, damping, count = 2.0, 2.0 * (2 * np.pi * 12.0) ** 2, 30.0, round(4.0 / step)
-    time = np.arange(count) * step
-    w = 2 * np.pi * frequency
-    whole = np.ones(count)
-    found = Swing(inertia * whole, damping * whole, stiffness * whole, step).solve(np.cos(w * time))
-    gain = 1.0 / (stiffness - inertia * w**2 + 1j * w * damping)
-    steady = slice(count // 2, count - 10)
-    # The scheme of fourth order errs by (w step)^4 / 240 of the square of the frequency.
-    allowed = 0.01 if w * step < 1.0 else 0.2
-    expected = np.real(gain * np.exp(1j * w * time))
-    assert np.abs(found[0] - expected)[steady].max() < allowed * np.abs(gain)
-
-
-def test_a_link_let_go_swings_at_its_own_frequency_and_dies_away():
-    count, omega, ratio = 3000, 2 * np.pi * 5.0, 0.05
-    whole, time = np.ones(count), np.arange(count) * STEP
-    swing = Swing(whole, 2.0 * ratio * omega * whole, omega**2 * whole, STEP)
-    damped = omega * np.sqrt(1.0 - ratio**2)
-    expected = np.exp(-ratio * omega * time) * (np.cos(damped * time) + ratio * omega / damped * np.sin(damped * time))
-    x, first, second = swing.solve(np.zeros(count), expected[:2])
-    assert np.abs(x - expected).max() < 2e-3
-    assert np.abs(second + omega**2 * x + 2.0 * ratio * omega * first).max() < 1e-9
-
-
-@pytest.mark.parametrize("ratio", [0.02, 0.2, 3.0])
-def test_a_free_swing_is_over_after_its_memory_and_its_first_samples_are_those_of_the_whole(ratio: float):
-    count, omega = 18000, 2 * np.pi * 6.0
-    varied = 1.0 + 0.3 * np.sin(np.arange(count) * STEP)
-    swing = Swing(varied, 2.0 * ratio * omega * np.ones(count), omega**2 * np.ones(count), STEP)
-    start = np.array([1.0, 1.0 - ratio * STEP])
-    x = swing.solve(np.zeros(count), start)
-    memory = swing.memory(1e-9)
-    assert memory < count
-    assert np.abs(x[0][memory:]).max() < 3e-9
-    for part, whole in zip(swing.solve(np.zeros(memory), start), x, strict=True):
-        # But for the derivative at the last sample, which has no next one.
-        np.testing.assert_array_equal(part[:-1], whole[: memory - 1])
-
-
-def test_no_digits_are_lost_to_the_length_of_a_run():
-    # Beside the same recursion with three more digits, which rounding of 2e-16 moves by the steps in a radian of the swing.
-    count, omega, step = 6000, 2 * np.pi * 3.0, 1e-3
-    rows = np.cumsum(np.random.default_rng(0).standard_normal(count))
-    x = Swing(*(size * np.ones(count) for size in (1.0, 0.02 * omega, omega**2)), step).solve(rows)[0]
-    precise, forces = [np.longdouble(value) for value in x[:2]], rows.astype(np.longdouble)
-    heavy, slow, spring = 1.0 / step**2, 0.01 * omega / step, omega**2 / 12.0
-    for k in range(2, count):
-        force = (forces[k] + 10.0 * forces[k - 1] + forces[k - 2]) / 12.0
-        before = (heavy - slow + spring) * precise[-2] + (10.0 * spring - 2.0 * heavy) * precise[-1]
-        precise.append((force - before) / (heavy + slow + spring))
-    assert np.abs(x - np.array(precise)).max() < 1e-11 * np.abs(x).max()
-
-
-def test_a_slow_load_winds_the_gear_up_by_load_over_stiffness():
-    load, whole = 5.0 + 3.0 * np.sin(np.arange(2000) / 300.0), np.ones(2000)
-    x, _, second = Swing(0.5 * whole, 20.0 * whole, 8e4 * whole, 1e-3).solve(load)
-    assert x == pytest.approx(load / 8e4, rel=1e-3)
-    assert np.all(np.isfinite(second))
+def alone(signals: Signals, joint: int, frequency: float, ratio: float) -> TwoMasses:
+    """The only elastic joint."""
+    return TwoMasses(signals, (Member(joint, (frequency, ratio)),))
 
 
 @pytest.mark.parametrize("joint", [0, 1])
@@ -88,12 +35,12 @@ def test_slopes_are_the_differences_of_the_torque_once_the_start_is_forgotten(jo
 
     def scaled(value: Array, armature: float = 0.0, frequency: float = 4.5, ratio: float = 0.1) -> Array:
         other = replace(scene, value=value, armatures={0: scene.armatures[0] + armature})
-        masses = TwoMasses(Signals(other, item), joint, frequency, ratio)
+        masses = alone(Signals(other, item), joint, frequency, ratio)
         return (masses.stiffness * masses.change / stiffness)[:, 1000:]
 
-    stiffness = TwoMasses(Signals(scene, item), joint, 4.5, 0.1).stiffness
+    stiffness = alone(Signals(scene, item), joint, 4.5, 0.1).stiffness
     bodies = len(scene.model.rigid_body.columns)
-    found = dense(TwoMasses(Signals(scene, item), joint, 4.5, 0.1).slopes(), bodies + 3)[:, :, 1000:]
+    found = dense(alone(Signals(scene, item), joint, 4.5, 0.1).slopes(0), bodies + 3)[:, :, 1000:]
     for k in range(bodies):
         step = 1e-3 * np.eye(len(scene.value))[k]
         expected = (scaled(scene.value + step) - scaled(scene.value - step)) / 2e-3
@@ -140,36 +87,22 @@ def swinging(stiffness: float, damping: float, start: float) -> tuple[Scene, Mot
     return scene, replace(item, torque=Signals(scene, item).predicted + change), change
 
 
-def test_the_swing_at_the_beginning_is_found_however_far_off_it_is_assumed():
-    count, rate = 2000, 500.0
-    swing = Swing(np.ones(count), np.full(count, 0.8), np.full(count, 25.0**2), 1.0 / rate)
-    free = swing.solve(np.zeros((2, count)), np.array([[1.0, 1.0], [0.0, swing.step]]))
-    torque, true = 100.0 * free[2], np.array([0.01, -2.0])
-    initial = InitialState(free, torque, rate, 20.0, slice(25, count - 25))
-    # As large a lag as a start that is 2 rad/s off makes.
-    found = initial.state(true @ torque, (np.full(count, 0.04), np.full(count, 1.0)))
-    assert np.abs((found - true) @ torque).max() < 1e-4 * np.abs(true @ torque).max()
-    # Of what no torque shows there is no more than was assumed.
-    unseen = InitialState(free, torque * [[1.0], [1e-7]], rate, 20.0, initial.used)
-    assert abs(unseen.state(true @ torque, (np.full(count, 0.04), np.full(count, 1.0)))[1]) < 0.05
-
-
 def test_slopes_are_the_differences_of_the_torque_where_its_first_samples_are_wrong():
     scene, item = scene_of(load_robot()), moving(load_robot(), 4.0)
     motor = item.a.copy()
     # As of positions of which nobody knows what was before.
     motor[:, 0] += 20.0
-    change = TwoMasses(Signals(scene, item), 1, 4.5, 0.05).change
+    change = alone(Signals(scene, item), 1, 4.5, 0.05).change
     item = replace(item, a=motor)
     item = replace(item, torque=Signals(scene, item).predicted + change)
 
     def torque(frequency: float) -> Array:
-        return TwoMasses(Signals(scene, item), 1, frequency, 0.05).change[1, 50:]
+        return alone(Signals(scene, item), 1, frequency, 0.05).change[1, 50:]
 
-    masses = TwoMasses(Signals(scene, item), 1, 4.5, 0.05)
+    masses = alone(Signals(scene, item), 1, 4.5, 0.05)
     # Those of stiffness times the change are had by the share too.
     share = 2.0 / 4.5 * masses.change[1, 50:]
-    found = dense(masses.slopes(), len(scene.model.rigid_body.columns) + 3)[1, -2, 50:] - share
+    found = dense(masses.slopes(0), len(scene.model.rigid_body.columns) + 3)[1, -2, 50:] - share
     expected = (torque(4.5 + 1e-4) - torque(4.5 - 1e-4)) / 2e-4
     # What stays of the wrong samples themselves, within the band, and the size of the lag.
     assert np.abs(found - expected).max() < 0.2 * np.abs(expected).max()
@@ -179,9 +112,9 @@ def test_slopes_are_the_differences_of_the_torque_where_its_first_samples_are_wr
 @pytest.mark.parametrize(("frequency", "start"), [(3.0, 0.0), (9.0, 0.01)])
 def test_the_torque_is_that_of_a_two_mass_arm_by_runge_and_kutta(frequency: float, start: float):
     scene = scene_of(load_robot(), name="basic", band=15.0)
-    masses = TwoMasses(Signals(scene, moving(load_robot())), 1, frequency, 0.04)
-    scene, item, change = swinging(masses.stiffness, masses.damping, start)
-    found = TwoMasses(Signals(scene, item), 1, frequency, 0.04).change
+    masses = alone(Signals(scene, moving(load_robot())), 1, frequency, 0.04)
+    scene, item, change = swinging(masses.stiffness[0], masses.damping[0], start)
+    found = alone(Signals(scene, item), 1, frequency, 0.04).change
     inside = slice(100, -100)
     assert np.abs(found - change)[:, inside].max() < 0.02 * np.abs(change)[:, inside].max()
 
@@ -190,14 +123,132 @@ def test_the_torque_is_that_of_a_two_mass_arm_by_runge_and_kutta(frequency: floa
 def test_what_acts_on_links_swings_with_them_as_if_the_bodies_had_it(frequency: float):
     robot, item = load_robot(), moving(load_robot(), 2.0)
     scenes = carrying(scene_of(robot), 2.0), heavier(robot, 2.0), scene_of(robot)
-    usual = [TwoMasses(Signals(scene, item), 1, 1.0, 0.1).inertia for scene in scenes]
+    usual = [alone(Signals(scene, item), 1, 1.0, 0.1).inertia[0] for scene in scenes]
     # The same stiffness and damping: both are told by the usual inertia, which the mass is part of or not.
     ratios = np.sqrt(usual[0] / np.array(usual))
     carried, merged, empty = (
-        TwoMasses(Signals(scene, item), 1, frequency * ratio, 0.1 * ratio)
+        alone(Signals(scene, item), 1, frequency * ratio, 0.1 * ratio)
         for scene, ratio in zip(scenes, ratios, strict=True)
     )
     assert merged.stiffness == pytest.approx(carried.stiffness) and merged.damping == pytest.approx(carried.damping)
     size = np.max(np.abs(merged.change))
     assert np.max(np.abs(carried.change - merged.change)) < 1e-4 * size
     assert np.max(np.abs(empty.change - merged.change)) > 0.1 * size
+
+
+def periodic(robot: Robot, stiffness: dict[int, float], size: float = 1.0) -> tuple[Scene, Motion, Array]:
+    """Elastic joints whose links move in sines, the motors by the Fourier series of what their springs carry.
+
+    No equation is solved in time: the torque of the links is that of the rigid bodies at their own motion.
+    """
+    scene = scene_of(robot, name="basic")
+    term, rate, count = scene.model.rigid_body, 500.0, 4000
+    value = scene.value[scene.model.place(term)]
+    rng, time = np.random.default_rng(5), np.arange(count) / rate
+    w = 2.0 * np.pi * rate / count * np.arange(1, 13)
+    parts = rng.standard_normal((2, robot.n, 12)) / np.arange(1, 13)
+    angles = w[:, None] * time
+    q = size * 0.3 * (parts[0] @ np.sin(angles) + parts[1] @ np.cos(angles))
+    turning = 2j * np.pi * np.fft.rfftfreq(count, 1.0 / rate)
+
+    def derived(part: Array, order: int = 1) -> Array:
+        return np.fft.irfft(turning**order * np.fft.rfft(part), count)
+
+    links = Motion("m", "m", time, q, derived(q), derived(q, 2), None, rate)
+    scale, armature = robot.row_scale[:, None], np.array([scene.armature(j) for j in range(robot.n)])[:, None]
+    gear = term.torque(links, value) / scale - armature * links.a
+    lag = np.zeros_like(q)
+    for j, k in stiffness.items():
+        lag[j] = np.fft.irfft(np.fft.rfft(gear[j]) / (k * (1.0 + 0.004 * turning)), count)
+    motor = replace(links, q=q + lag, v=derived(q + lag), a=derived(q + lag, 2))
+    change = scale * (gear + armature * motor.a) - term.torque(motor, value)
+    return scene, replace(motor, torque=Signals(scene, motor).predicted + change), change
+
+
+def members_with(scene: Scene, stiffness: dict[int, float]) -> tuple[Member, ...]:
+    """The members of gears with a stiffness and the damping of `periodic`."""
+    found = []
+    for j, k in stiffness.items():
+        turning = np.sqrt(k / usual_link_inertia(scene, j))
+        found.append(Member(j, (turning / (2.0 * np.pi), 0.5 * 0.004 * turning)))
+    return tuple(found)
+
+
+@pytest.mark.parametrize(
+    ("name", "stiffness"),
+    [("scara03", {0: 4000.0, 1: 900.0}), ("ur5", {0: 3000.0, 1: 3000.0}), ("ur5", {0: 3000.0, 1: 3000.0, 2: 3000.0})],
+)
+def test_several_elastic_joints_are_those_of_links_whose_motion_is_given(name: str, stiffness: dict[int, float]):
+    scene, item, change = periodic(load_robot() if name == "scara03" else load_robot(name), stiffness)
+    members = members_with(scene, stiffness)
+
+    def off(found: Array, part: slice) -> float:
+        return float(np.linalg.norm((found - change)[:, part]) / np.linalg.norm(change[:, part]))
+
+    together = TwoMasses(Signals(scene, item), members).change
+    alone = sum(TwoMasses(Signals(scene, item), (one,)).change for one in members)
+    # How they began is fitted to first order in lags of up to 0.03 rad, which fades.
+    assert off(together, slice(100, -100)) < 0.015
+    assert off(together, slice(1500, -100)) < 1e-3
+    assert off(alone, slice(100, -100)) > 0.05
+
+
+def test_what_each_link_adds_is_all_that_they_do_together():
+    scene, item, change = periodic(load_robot(), {0: 4000.0, 1: 900.0})
+    # Of first order, and of all orders.
+    for stiffness in ({0: 4e4, 1: 9e3}, {0: 4000.0, 1: 900.0}):
+        masses = TwoMasses(Signals(scene, item), members_with(scene, stiffness))
+        assert np.abs(sum(masses.parts) - masses.change).max() < 1e-9 * np.abs(change).max()
+
+
+def test_an_estimate_of_no_arm_lets_nothing_grow():
+    scene, item, _ = periodic(load_robot("ur5"), {0: 3000.0, 1: 3000.0})
+    rng = np.random.default_rng(8)
+    value = scene.value * (1.0 + rng.standard_normal(len(scene.value)))
+    other = replace(scene, value=value)
+    members = tuple(Member(j, (5.0, 0.1)) for j in (1, 2) if usual_link_inertia(other, j) > 0.0)
+    lag = TwoMasses(Signals(other, item), members).lag
+    assert np.all(np.isfinite(lag[0])) and np.abs(lag[0]).max() < 10.0
+
+
+@pytest.mark.parametrize("recorded", [False, True])
+def test_slopes_add_up_to_the_differences_of_what_all_links_do(recorded: bool):
+    _, item, whole = periodic(load_robot(), {0: 12000.0, 1: 2500.0})
+    scene = scene_of(load_robot())
+    members = members_with(scene, {0: 12000.0, 1: 2500.0})
+    item = replace(item, torque=Signals(scene, item).predicted + whole if recorded else None)
+    inside = slice(60, -60) if recorded else slice(1000, None)
+    bodies = len(scene.model.rigid_body.columns)
+
+    def change(value: Array, members: tuple[Member, ...] = members, armature: float = 0.0) -> Array:
+        other = replace(scene, value=value, armatures={0: scene.armatures[0] + armature})
+        return TwoMasses(Signals(other, item), members).change[:, inside]
+
+    def other(place: int, which: int, by: float) -> tuple[Member, ...]:
+        nonlinear = list(members[place].nonlinear)
+        nonlinear[which] += by
+        return (*members[:place], replace(members[place], nonlinear=tuple(nonlinear)), *members[place + 1 :])
+
+    family = JointElasticity()
+    masses = TwoMasses(Signals(scene, item), members)
+    total, own = np.zeros((scene.robot.n, bodies, item.samples)), []
+    for place, member in enumerate(members):
+        found = dense(masses.slopes(place), bodies + 3)
+        # The tie takes away what the coefficient changes by.
+        tie = family.tie(scene, member)
+        assert tie is not None
+        found += tie.slopes[None, :, None] * (masses.stiffness[place] * masses.parts[place])[:, None]
+        total += found[:, :bodies]
+        own.append(found[:, bodies:])
+    for k in range(bodies):
+        step = 1e-3 * np.eye(len(scene.value))[k]
+        expected = (change(scene.value + step) - change(scene.value - step)) / 2e-3
+        assert norm(total[:, k, inside] - expected) < 0.05 * norm(expected) + 1e-5 * norm(total)
+    for place in range(2):
+        for which, step in ((0, 1e-3), (1, 1e-4)):
+            expected = change(scene.value, other(place, which, step)) - change(scene.value, other(place, which, -step))
+            expected /= 2.0 * step
+            # Slopes are taken about no lag, and err by its size.
+            assert norm(own[place][:, 1 + which, inside] - expected) < 0.06 * norm(expected)
+    expected = (change(scene.value, armature=1e-3) - change(scene.value, armature=-1e-3)) / 2e-3
+    assert norm(own[0][:, 0, inside] - expected) < 0.03 * norm(expected)

@@ -140,6 +140,30 @@ def test_what_acts_on_links_reads_back_with_the_load_of_a_gear(found, content, r
     assert read(wider).model.terms[-1].scene.link_torques == ()
 
 
+def test_effects_that_act_together_read_back_with_each_other(found, content, read):
+    base = found.model
+    model = with_effects(base, found.estimate.value, ("joint_elasticity",))
+    terms = model.terms[len(base.terms) :]
+    together = tuple((term.effect, replace(term.member, joint=j)) for j, term in enumerate(terms * 2) if j < 2)
+    model = replace(
+        model, terms=(*base.terms, *(replace(term, scene=replace(term.scene, together=together)) for term in terms))
+    )
+    k = len(model.columns)
+    value = np.concatenate([found.estimate.value, np.full(k - len(base.columns), 1e-5)])
+    estimate = Estimate(
+        model, "wls", value, np.eye(k), np.zeros(k, dtype=bool), found.estimate.information, found.estimate.weights, ""
+    )
+    entry = rebuild_entry(estimate, found.training, found.validation)
+    nothing = [{"samples": 0.0, "rows": 0, "factor": ""}] * 2
+    entry["observations"] = {"training": nothing, "validation": nothing}
+    parameters = [column.entry(value=x, std=1.0) for column, x in zip(model.columns, value, strict=True)]
+    wider = content | {"parameters": parameters, KEY: entry, "effects": []}
+    assert read(wider).model.terms[-1].scene.together == together
+    # Results of earlier versions have none.
+    del wider[KEY]["scene"]["together"]
+    assert read(wider).model.terms[-1].scene.together == ()
+
+
 def test_a_diagnosis_without_recordings_held_out_has_the_errors_of_the_training(content, read):
     told = {"after_unfiltered": {"joint1": 0.5, "joint2": 0.25}}
     diagnosis = {**content, "errors": None, "training": told, "validation": {"before": {}, "after": {}}}

@@ -92,6 +92,26 @@ def test_an_elastic_joint_has_a_link_and_a_motor_of_its_own(effect: Effect) -> N
         assert np.abs(load[1, ~free]).max() > 1.0
 
 
+@pytest.mark.parametrize(("name", "joints"), [("scara03", (0, 1)), ("ur5", (0, 1, 2))])
+def test_several_elastic_joints_obey_the_equations_of_all_links_at_once(name: str, joints: tuple[int, ...]) -> None:
+    arm = scara() if name == "scara03" else ideal(virtual_arm(load_robot(name)))
+    effects = [fx.JointElasticity(arm.robot.joints[j], 4000.0) for j in joints]
+    true = simulate(arm, swing(arm.robot, 1.0, amplitude=0.3), effects=effects).true
+    # By Pinocchio, at the motion of the links.
+    load = rnea(arm.robot, true.link_position, true.link_velocity, true.link_acceleration)
+    np.testing.assert_allclose(true.load, load, atol=1e-9)
+    for j, effect in zip(joints, effects, strict=True):
+        reduced = 1.0 / (1.0 / arm.link_inertia()[j] + 1.0 / arm.armature[j])
+        damping = 2.0 * effect.damping_ratio * np.sqrt(4000.0 * reduced)
+        stretch, rate = (true.position - true.link_position)[j], (true.velocity - true.link_velocity)[j]
+        np.testing.assert_allclose(load[j], 4000.0 * stretch + damping * rate, atol=1e-8)
+    # And the motion is that of its own accelerations.
+    for place, speed in ((true.link_position, true.link_velocity), (true.link_velocity, true.link_acceleration)):
+        change = np.gradient(place, 1e-3, axis=1)[:, 5:-5]
+        # Dry friction makes them jump.
+        assert np.linalg.norm(change - speed[:, 5:-5]) < 0.02 * np.linalg.norm(speed)
+
+
 def test_a_very_stiff_elastic_joint_is_a_rigid_one() -> None:
     plain = run(duration=1.0).true.position
     errors = [
