@@ -53,6 +53,7 @@ def test_text_stands_for_an_effect(text: str, expected: Effect) -> None:
         ("push:force=1/2", "expected a number"),
         ("push:time=3", "it has force, from, duration, direction, link, point, edge, recording"),
         ("spring:joint1:size=3", "it has stiffness, rest_position, recording"),
+        ("spring:joint=joint2,stiffness=1", "name the joint before the values: spring:joint2:KEY=VALUE"),
     ],
 )
 def test_text_that_stands_for_none_is_one_line(text: str, said: str) -> None:
