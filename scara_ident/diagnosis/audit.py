@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,14 +10,16 @@ import numpy as np
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.acceptance import Decision, hopeless
 from scara_ident.diagnosis.candidate_tests import Examination
+from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.cluster_test import significance
-from scara_ident.diagnosis.effect_parameters import Coefficients, physical_parameters
+from scara_ident.diagnosis.effect_parameters import Coefficients, physical_parameters, told_size
 from scara_ident.diagnosis.moments import examine_moments
 from scara_ident.diagnosis.noise_check import made_by_noise, noise_objection, within_a_step
 from scara_ident.diagnosis.remainder_check import remainder_objection
 from scara_ident.diagnosis.search import Search
 from scara_ident.diagnosis.selection_step import SelectionStep, best_of_each
 from scara_ident.diagnosis.variation_check import variation_objection
+from scara_ident.effects import Parameter
 from scara_ident.estimation.run_variation import LEAST_RUNS
 
 
@@ -36,6 +38,8 @@ def unsettled(found: Search, weights: Array) -> list[Decision]:
         return []
     # Whether runs that differ make it is asked of it alone, on rows that weigh them as noise.
     coefficients = physical_parameters(step, scatter_alone=True).coefficients
+    # One of several that act together may mend what another lacks: then scatter alone does not say how unsure it is.
+    sizes = physical_parameters(step).effects if len(step.scene.together) > 1 else ()
     result = []
     for place, (candidate, own) in enumerate(zip(step.chosen, coefficients, strict=True)):
         beside = step.without(place)
@@ -43,6 +47,8 @@ def unsettled(found: Search, weights: Array) -> list[Decision]:
         why = None if decision.accepted else decision.why
         least, essential = step.criteria.least_final_size, candidate.effect.essential(step.scene, candidate.member)
         why = why or uncertain(own, decision.examination, essential, least)
+        if why is None and sizes and candidate.effect.together:
+            why = _unsized(step, candidate, sizes[place])
         small = candidate.effect.negligible(step.scene, candidate.member, own.at_least(least))
         why = why or (small and f"within its uncertainty {small}")
         why = why or noise_objection(beside, decision)
@@ -52,6 +58,13 @@ def unsettled(found: Search, weights: Array) -> list[Decision]:
         if why is not None:
             result.append(decision.refused(why))
     return result
+
+
+def _unsized(step: SelectionStep, candidate: Candidate, sizes: Mapping[str, Parameter]) -> str | None:
+    """Say so where the size of one of several effects that act together is not told: it may mend what another lacks."""
+    if told_size(candidate.effect, sizes, step.criteria.least_size):
+        return None
+    return "its size is within its uncertainty beside those that it acts with, of which it may mend what they lack"
 
 
 def _repeated(step: SelectionStep, decision: Decision) -> str | None:

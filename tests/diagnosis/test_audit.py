@@ -22,7 +22,7 @@ from scara_ident.diagnosis.candidate_tests import Examination
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.diagnose import diagnose
-from scara_ident.diagnosis.effect_parameters import Coefficients
+from scara_ident.diagnosis.effect_parameters import Coefficients, physical_parameters
 from scara_ident.effects import Coefficient, Effect, Member
 from scara_ident.effects.friction import AsymmetricFriction
 from scara_ident.effects.periodic import TorqueRipple
@@ -90,6 +90,41 @@ def test_a_spring_of_the_arm_stands(monkeypatch: pytest.MonkeyPatch):
     # What turns within a step of the encoder is no rival: nothing real was refused.
     monkeypatch.setattr(audit, "within_a_step", lambda step, candidate: "less than a step")
     assert outdone(proxy, found.step.weights, (held.refused(""),)) == []
+
+
+class SpringTogether(Spring):
+    """A spring that is said to act together with those of other joints."""
+
+    together = True
+
+
+def test_of_those_that_act_together_one_whose_size_is_not_told_falls(monkeypatch: pytest.MonkeyPatch):
+    made = exact_runs()
+    for joint in (0, 1):
+        made = with_torque(made, joint, lambda motion, joint=joint: 0.3 * motion.q[joint])
+    found = searched(made, SpringTogether())
+    assert {item.member.joint for item in found.chosen} == {0, 1}
+    assert unsettled(found, found.step.weights) == []
+    place = next(k for k, item in enumerate(found.chosen) if item.member.joint == 1)
+
+    def unsure(step, *, scatter_alone=False):
+        told = physical_parameters(step, scatter_alone=scatter_alone)
+        effects = [
+            {name: replace(own, std=np.inf) for name, own in sizes.items()}
+            if k == place and not scatter_alone
+            else sizes
+            for k, sizes in enumerate(told.effects)
+        ]
+        return replace(told, effects=tuple(effects))
+
+    monkeypatch.setattr(audit, "physical_parameters", unsure)
+    (fallen,) = unsettled(found, found.step.weights)
+    assert fallen.label == found.chosen[place].label(found.scene)
+    assert fallen.why.startswith("its size is within its uncertainty beside those that it acts with")
+    # One alone is believed, with a size that is not told.
+    alone = searched(with_torque(exact_runs(), 1, lambda motion: 0.3 * motion.q[1]), SpringTogether())
+    place = 0
+    assert unsettled(alone, alone.step.weights) == []
 
 
 def test_what_was_found_and_refused_leaves_it_open(monkeypatch: pytest.MonkeyPatch):
