@@ -115,21 +115,19 @@ def contact_force(
         # What a force elsewhere explains is no change of the force meanwhile.
         beside = _beside_tool(fitted, fitted.scatter, force)
         unsure = _unsure(fitted, beside.left)
+        beside = _beside_tool(fitted, unsure, beside.force, beside.point)
     if explained >= FITS and _leaves_noise(np.mean(at_tool, axis=0), np.mean(fitted.torques, axis=0), unsure):
         if not told:
             return ContactForce(explained, True)
-        covariance = force_covariance(at_tool, fitted.scatter + left.T @ left / len(left))
-        if beside is not None:
+        if beside is None:
+            covariance = force_covariance(at_tool, fitted.scatter + left.T @ left / len(left))
+        else:
             # Nobody knows that it is on the tool to the millimetre: it is as unsure as a force near the tool, and as what that would be.
-            near = _beside_tool(fitted, unsure, beside.force, beside.point)
-            covariance = near.covariance[:3, :3] + np.outer(near.force - force, near.force - force)
+            covariance = beside.covariance[:3, :3] + np.outer(beside.force - force, beside.force - force)
         return ContactForce(explained, True, force, covariance)
     last = place_of(robot, robot.model.njoints - 1)
     loaded = abs(float(np.mean(fitted.torques[:, last]))) > LOADED * float(np.sqrt(unsure[last, last]))
-    if beside is None or not loaded:
-        return ContactForce(explained, False)
-    beside = _beside_tool(fitted, unsure, beside.force, beside.point)
-    if not beside.likely:
+    if beside is None or not loaded or not beside.likely:
         return ContactForce(explained, False)
     turn, origin = tool_placement(robot)
     std = np.sqrt(np.diag(turn @ beside.covariance[3:, 3:] @ turn.T))
@@ -183,7 +181,7 @@ class _Beside:
     covariance : ndarray, shape (6, 6)
         Of force and point.
     likely : bool
-        Whether it leaves no more than is unsure.
+        Whether the steps ended, and it leaves no more than is unsure.
     """
 
     force: Array
@@ -200,7 +198,7 @@ def _beside_tool(fitted: _Strong, unsure: Array, force: Array, point: Array | No
     half = np.linalg.inv(np.linalg.cholesky(unsure)) / np.sqrt(len(fitted.torques))
     rows, torques = np.einsum("ij,kjab->kiab", half, fitted.rows), fitted.torques @ half.T
     prior = np.hstack([np.zeros((3, 3)), np.eye(3) / ABOUT_TOOL])
-    point = np.zeros(3) if point is None else point
+    point, ended = np.zeros(3) if point is None else point, False
     for _ in range(STEPS):
         by_force = rows[..., 0] + rows[..., 1:] @ point
         by_point = np.einsum("kiab,a->kib", rows[..., 1:], force)
@@ -209,8 +207,9 @@ def _beside_tool(fitted: _Strong, unsure: Array, force: Array, point: Array | No
         step = np.linalg.lstsq(slope, left, rcond=None)[0]
         force, point = force + step[:3], point + step[3:]
         if np.linalg.norm(step[:3]) < ENOUGH * np.linalg.norm(force) and np.linalg.norm(step[3:]) < ENOUGH * ABOUT_TOOL:
+            ended = True
             break
     # Of all joints' torques and the point's three numbers, six are used up.
-    likely = float(chdtrc(unsure.shape[0] - 3, left @ left)) >= REFUSED
+    likely = ended and float(chdtrc(unsure.shape[0] - 3, left @ left)) >= REFUSED
     whole = fitted.torques - (fitted.rows[..., 0] + fitted.rows[..., 1:] @ point) @ force
     return _Beside(force, point, whole, np.linalg.inv(slope.T @ slope), likely)
