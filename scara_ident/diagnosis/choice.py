@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from scara_ident.diagnosis.acceptance import Decision
+from scara_ident.diagnosis.candidate_tests import coefficients
 from scara_ident.diagnosis.candidates import Candidate
-from scara_ident.diagnosis.correction import taken_out
+from scara_ident.diagnosis.correction import beside_runs, taken_out
 from scara_ident.diagnosis.criteria import SelectionCriteria
 from scara_ident.diagnosis.effect_parameters import parameters_beside, told_size
 from scara_ident.diagnosis.noise_check import noise_objection
@@ -263,11 +264,16 @@ def _left_again(step: SelectionStep, decision: Decision) -> str | None:
     candidate, first = decision.candidate, decision.examination.value
     if not candidate.corrects_data:
         return None
-    _, whole = taken_out(step, candidate)
+    if candidate.effect.of_each_recording:
+        beside = beside_runs(step, candidate)
+        (rows,) = beside.rows(beside.scene, [candidate])
+        first, _ = coefficients(beside.model, rows, step.criteria)
+    whole = taken_out(step, candidate)[1].value
     if np.max(np.abs(whole - first)) <= step.criteria.lower_change * np.max(np.abs(first)):
         return None
     name, unit = candidate.effect.coefficients[0].name, candidate.effect.coefficients[0].unit
-    return f"{name} would be {first[0]:.2g} {unit}, but {whole[0]:.2g} {unit} until nothing of it is left in the data"
+    place = int(np.argmax(np.abs(whole - first)))
+    return f"{name} would be {first[place]:.2g} {unit}, but {whole[place]:.2g} {unit} until nothing of it is left in the data"
 
 
 def _insignificant(step: SelectionStep, candidate: Candidate) -> str | None:

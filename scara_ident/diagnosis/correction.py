@@ -9,10 +9,12 @@ import numpy as np
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.at_estimate import at_estimate
 from scara_ident.diagnosis.candidate_tests import coefficients
-from scara_ident.diagnosis.candidates import Candidate, CandidateColumns
+from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, with_columns
 from scara_ident.diagnosis.selection_step import SelectionStep, observed
 from scara_ident.effects import Scene
 from scara_ident.estimation.least_squares import value_and_weights
+from scara_ident.estimation.run_variation import DELAY
+from scara_ident.estimation.variation_between import run_variation
 from scara_ident.motion.prepared import PreparedData
 
 # Each leaves a tenth or less of what the last one left.
@@ -26,11 +28,32 @@ class Correction:
     Attributes
     ----------
     value : ndarray, shape (k,)
-        In all.
+        In all; one coefficient for each recording where each has its own, see `Effect.of_each_recording`.
+    recordings : tuple of str
+        Names of the recordings, in the order of such coefficients.
     """
 
     candidate: Candidate
     value: Array
+    recordings: tuple[str, ...]
+
+    @property
+    def of_each(self) -> bool:
+        """Whether each recording has a coefficient of its own."""
+        return self.candidate.effect.of_each_recording
+
+    def of(self, name: str) -> Array:
+        """Return the coefficients of one of the recordings."""
+        if not self.of_each:
+            return self.value
+        place = self.recordings.index(name)
+        return self.value[place : place + 1]
+
+    def beside(self, other: Correction | None) -> Correction:
+        """Return what both take out of the same recordings; what all have alike counts for each."""
+        if other is None:
+            return self
+        return replace(self if self.of_each else other, value=self.value + other.value)
 
     def negligible(self, scene: Scene) -> str | None:
         """Say why it is too small to be an effect; None where it is not."""
@@ -42,14 +65,29 @@ class Correction:
         return None if found is None else (Candidate(found[0], found[1]), found[2])
 
 
-def corrected(data: PreparedData, candidate: Candidate, value: Array) -> PreparedData:
+def corrected(data: PreparedData, correction: Correction) -> PreparedData:
     """Return recordings without an effect that is taken out of them."""
-    effect, member = candidate.effect, candidate.member
-    mended = (item.with_effort_of(effect.corrected(item.recording, member, value)) for item in data.recordings)
+    effect, member = correction.candidate.effect, correction.candidate.member
+    mended = (
+        item.with_effort_of(effect.corrected(item.recording, member, correction.of(item.name)))
+        for item in data.recordings
+    )
     return replace(data, recordings=tuple(mended))
 
 
-def taken_out(step: SelectionStep, candidate: Candidate) -> tuple[CandidateColumns, Array]:
+def beside_runs(step: SelectionStep, candidate: Candidate) -> SelectionStep:
+    """Return the step that the size of a correction is told beside.
+
+    What runs differ by otherwise is noise to what each recording has of its own, or taken for that where a run moves little.
+    """
+    if not candidate.effect.of_each_recording:
+        return step
+    joints = with_columns(step.observations, step.columns.rows(step.scene, step.chosen))
+    variation = run_variation(step.observations, joints, step.model.root @ step.model.projected).without(DELAY)
+    return replace(step, variation=variation) if variation else step
+
+
+def taken_out(step: SelectionStep, candidate: Candidate) -> tuple[CandidateColumns, Correction]:
     """Take an effect out of the data, and again while some of it is left.
 
     A first estimate is one of first order, beside parameters that stand for some of it.
@@ -58,9 +96,11 @@ def taken_out(step: SelectionStep, candidate: Candidate) -> tuple[CandidateColum
     -------
     CandidateColumns
         On the rows of the corrected data.
-    ndarray, shape (k,)
+    Correction
         All that was taken out.
     """
+    names = tuple(item.name for item in step.observations.data.recordings)
+    step = beside_runs(step, candidate)
     whole, last = np.zeros(len(candidate.effect.columns(step.scene, candidate.member))), np.inf
     for _ in range(MOST_CORRECTIONS):
         (own,) = step.rows(step.scene, [candidate])
@@ -69,8 +109,10 @@ def taken_out(step: SelectionStep, candidate: Candidate) -> tuple[CandidateColum
         if candidate.effect.settled(value) or size >= last:
             break
         whole, last = whole + value, size
-        observations = step.observations.with_torque(corrected(step.observations.data, candidate, value))
+        observations = step.observations.with_torque(
+            corrected(step.observations.data, Correction(candidate, value, names))
+        )
         step = replace(step, columns=step.columns.beside(observations))
         estimate, weights = value_and_weights(observed(step), step.offsets)
         step = replace(step, scene=at_estimate(step.scene, step.chosen, estimate), weights=weights)
-    return step.columns, whole
+    return step.columns, Correction(candidate, whole, names)

@@ -120,6 +120,7 @@ def found_effects(
         candidate = decision.candidate
         now, otherwise = item.rms, ""
         if candidate.corrects_data and found.correction is not None:
+            candidate = found.correction.candidate
             listed = any(result.candidate is None for result in results)
             if listed or uncounted_correction(found, parameters) is not None:
                 before = now
@@ -175,13 +176,16 @@ def uncounted_correction(found: Search, parameters: PhysicalParameters) -> str |
     small = found.correction.negligible(found.scene)
     if small is not None:
         return small
-    own = Coefficients(value, parameters.coefficients[-1].covariance)
+    whole = parameters.coefficients[-1].covariance
+    own = Coefficients(*candidate.effect.alike(value, whole))
     stds = found.step.criteria.least_final_size
     least = own.at_least(stds)
     small = candidate.effect.negligible(found.scene, candidate.member, least)
     if np.any(least) and small is None:
         return None
-    told = said(candidate.effect.parameters(found.scene, candidate.member, value, own.covariance))
+    told = said(candidate.effect.parameters(found.scene, candidate.member, value, whole))
+    if found.correction.of_each:
+        told = f"{candidate.effect.description(found.scene, candidate.member)}: {told}"
     if not np.any(least):
         return f"{told}, with what runs differ by counted: within {stds:g} standard deviations of none"
     return f"{told}, with what runs differ by counted: less {stds:g} standard deviations, {small}"

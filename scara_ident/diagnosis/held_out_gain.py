@@ -75,7 +75,12 @@ class HeldOutGain:
 
 
 def held_out_gains(
-    found: Search, after: Estimate, held_out: Observations, uncorrected: Observations, quiet: Array
+    found: Search,
+    after: Estimate,
+    held_out: Observations,
+    uncorrected: Observations,
+    quiet: Array,
+    correction: Correction | None,
 ) -> Mapping[str, HeldOutGain]:
     """Return what each effect found changes on recordings held out, by its label; those that act in none left out.
 
@@ -91,6 +96,8 @@ def held_out_gains(
         Of the base model, not corrected.
     quiet : ndarray, shape (blocks,)
         0 for blocks of time that count for nothing in ``held_out``, as an event is there, 1 for others.
+    correction : Correction or None
+        What was taken out of the recordings held out.
 
     Notes
     -----
@@ -103,7 +110,7 @@ def held_out_gains(
     errors = _errors(held_out.joints, after.value)
     whole = _squares(errors, after.weights)
     gains = {}
-    for label, own, others, beside in _each_left_out(found, after, held_out, uncorrected, quiet):
+    for label, own, others, beside in _each_left_out(found, after, held_out, uncorrected, quiet, correction):
         without = _squares(others, after.weights)
         # What all else becomes without it may change other joints by what the training leaves unsure there.
         joint = slice(None) if own is None else own
@@ -147,7 +154,12 @@ def words_of(gain: HeldOutGain, unit: str) -> str:
 
 
 def _each_left_out(
-    found: Search, after: Estimate, held_out: Observations, uncorrected: Observations, quiet: Array
+    found: Search,
+    after: Estimate,
+    held_out: Observations,
+    uncorrected: Observations,
+    quiet: Array,
+    correction: Correction | None,
 ) -> Iterator[tuple[str, int | None, list[Array], list[Array]]]:
     """Give each effect's label and joint with the errors held out of all else, fitted to the training without it, and with it."""
     scene, start = found.scene, uncorrected.parameters
@@ -161,14 +173,14 @@ def _each_left_out(
             value = np.insert(value, np.full(len(columns), columns[0]), 0.0)
             own = None if candidate.effect.all_joints else candidate.member.joint
             yield candidate.label(scene), own, _errors(held_out.joints, value), errors
-    if found.correction is not None:
+    if correction is not None:
         step = replace(found.step, columns=found.step.columns.beside(found.uncorrected))
         value, _ = told_value_and_weights(observed(step), after.offsets)
-        candidate = found.correction.candidate
+        candidate = correction.candidate
         joints = held_out.with_torque(uncorrected.data).faded(quiet).joints
         # Both of the recordings as they are: what correcting makes of their noise would count as half of the effect.
         beside = _errors(joints, after.value)
-        for j, change in enumerate(_put_in(held_out, found.correction, after.value)):
+        for j, change in enumerate(_put_in(held_out, correction, after.value)):
             beside[j] = beside[j] - np.repeat(quiet, np.diff(joints[j].starts)) * change
         yield candidate.label(scene), candidate.member.joint, _errors(joints, value), beside
 
@@ -181,7 +193,7 @@ def _put_in(observations: Observations, correction: Correction, value: Array) ->
         for part in item.stretches:
             torque = next(predicted)
             one = Recording(item.name, item.name, 1, item.recording.joints, part.motion.time, part.motion.q, torque)
-            moved = effect.corrected(one, member, -correction.value).effort
+            moved = effect.corrected(one, member, -correction.of(item.name)).effort
             parts.append((part, np.zeros_like(torque) if moved is None else moved - torque))
     return [
         np.concatenate([part.rows(j, change[j : j + 1])[0] for part, change in parts if part.usable])

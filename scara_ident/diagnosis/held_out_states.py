@@ -14,10 +14,12 @@ import numpy as np
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.at_estimate import moved_with
 from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, columns_at_hand
-from scara_ident.diagnosis.correction import corrected
+from scara_ident.diagnosis.correction import Correction, corrected
+from scara_ident.diagnosis.held_out_correction import own_correction
 from scara_ident.diagnosis.held_out_intervals import told_by_others, words_of
 from scara_ident.diagnosis.search import Search
 from scara_ident.effects import Scene
+from scara_ident.estimation import Estimate
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.identification.usable import with_rows
 from scara_ident.motion.prepared import PreparedData, prepare
@@ -39,46 +41,56 @@ class HeldOut:
         That knows when they began.
     chosen : tuple of Candidate
         The effects found, which also act in those of them that they were seen in.
+    correction : Correction or None
+        What is to be taken out of them; its own of each where each has its own.
     """
 
     data: PreparedData
     scene: Scene
     chosen: tuple[Candidate, ...]
     notes: tuple[str, ...]
+    correction: Correction | None
 
 
-def held_out_states(found: Search, value: Array, weights: Array, data: PreparedData) -> HeldOut:
+def held_out_states(found: Search, after: Estimate, data: PreparedData) -> HeldOut:
     """Find the state of held-out recordings, each by its own first part.
 
     Parameters
     ----------
-    value : ndarray, shape (p,)
-        Parameters of the model with the effects found.
-    weights : ndarray, shape (n,)
+    after : Estimate
+        Of the model with the effects found.
     data : PreparedData
         The held-out recordings, in the bands of the search.
     """
     optional = [k for k, item in enumerate(found.chosen) if item.effect.by_recording]
     if not data.recordings:
-        return HeldOut(data, found.scene, found.chosen, ())
-    by_recording = _by_recording(found, value, weights, data, optional)
+        return HeldOut(data, found.scene, found.chosen, (), found.correction)
+    value, weights = after.value, after.weights
+    by_recording = _by_recording(found, after, data, optional)
     timed = [k for k, item in enumerate(found.chosen) if item.effect.in_intervals]
     return _in_intervals(found, value, weights, by_recording, timed) if timed else by_recording
 
 
-def _by_recording(found: Search, value: Array, weights: Array, data: PreparedData, optional: Sequence[int]) -> HeldOut:
+def _by_recording(found: Search, after: Estimate, data: PreparedData, optional: Sequence[int]) -> HeldOut:
     """Return in which of the recordings effects act that act in some recordings only."""
     start = {item.name: float(item.recording.time[0]) for item in data.recordings}
     scene = replace(found.scene, start={**found.scene.start, **start})
-    if not optional:
-        return HeldOut(data, scene, found.chosen, ())
+    correction = found.correction
+    own = correction is not None and correction.of_each
+    if not optional and not own:
+        return HeldOut(data, scene, found.chosen, (), correction)
     parted = [_parted(item.recording) for item in data.recordings]
     heads, _ = with_rows(prepare([head for head, _ in parted], data.bands), needed=False)
     chosen, seen, notes = list(found.chosen), {}, []
-    if heads.recordings:
-        for one in _observed(found, heads).each:
-            seen[one.name] = _acting(one, scene, chosen, optional, value, weights)
-    for name in start:
+    if correction is not None and own:
+        training = [_parted(item.recording)[0] for item in found.uncorrected.data.recordings]
+        known, _ = with_rows(prepare(training, data.bands), needed=False)
+        correction, words = own_correction(found, after, known, heads, scene, tuple(start))
+        notes += words
+    if heads.recordings and optional:
+        for one in _observed(found, heads, correction).each:
+            seen[one.name] = _acting(one, scene, chosen, optional, after.value, after.weights)
+    for name in start if optional else ():
         for k in seen.get(name, ()):
             item = chosen[k]
             chosen[k] = replace(item, member=item.effect.in_recordings(scene, item.member, frozenset([name])))
@@ -87,14 +99,15 @@ def _by_recording(found: Search, value: Array, weights: Array, data: PreparedDat
         notes.append(f"{name}: its first third {shown if name in seen else 'is too short to show which effects act'}")
     rest, useless = with_rows(prepare([rest for _, rest in parted], data.bands), needed=False)
     scene = moved_with(scene, found.chosen, chosen)
-    return HeldOut(rest, scene, tuple(chosen), (*notes, "errors held out are of the other two thirds", *useless))
+    notes += ["errors held out are of the other two thirds", *useless]
+    return HeldOut(rest, scene, tuple(chosen), tuple(notes), correction)
 
 
 def _in_intervals(found: Search, value: Array, weights: Array, held: HeldOut, timed: Sequence[int]) -> HeldOut:
     """Return in which intervals of the recordings effects act that act in some."""
     chosen, notes = list(held.chosen), list(held.notes)
     if held.data.recordings:
-        for one in _observed(found, held.data).each:
+        for one in _observed(found, held.data, held.correction).each:
             for k in timed:
                 item = chosen[k]
                 apart, seen = told_by_others(one, held.scene, held.chosen, k, value, weights)
@@ -107,12 +120,10 @@ def _in_intervals(found: Search, value: Array, weights: Array, held: HeldOut, ti
     return replace(held, scene=scene, chosen=tuple(chosen), notes=tuple(notes))
 
 
-def _observed(found: Search, data: PreparedData) -> Observations:
-    """Return observations of the base model, corrected as the training recordings were."""
+def _observed(found: Search, data: PreparedData, correction: Correction | None) -> Observations:
+    """Return observations of the base model, without what is taken out of them."""
     observations = observe(found.base, data)
-    if found.correction is None:
-        return observations
-    return observations.with_torque(corrected(data, found.correction.candidate, found.correction.value))
+    return observations if correction is None else observations.with_torque(corrected(data, correction))
 
 
 def _acting(

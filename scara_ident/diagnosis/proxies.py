@@ -61,7 +61,10 @@ def proxies(found: Outcome, criteria: SelectionCriteria) -> list[Decision]:
     labels = [item.label(search.scene) for item in search.chosen]
     refused = []
     # What is corrected and not counted is not believed of an arm: put back, it would only be in the parameters again.
-    uncounted = search.correction is not None and search.correction.negligible(search.scene) is not None
+    # Nor does what each recording has of its own take anything of what repeats.
+    uncounted = search.correction is not None and (
+        search.correction.of_each or search.correction.negligible(search.scene) is not None
+    )
     for step, without, beside in _each_without(found, labels):
         decision = step.decision
         if uncounted and decision.candidate.corrects_data:

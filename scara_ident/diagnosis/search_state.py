@@ -144,8 +144,8 @@ class SearchState:
 
     def corrected(self, candidate: Candidate) -> SearchState:
         """Return the state with an effect taken out of the data, beside what was taken out of them before."""
-        columns, value = taken_out(self.step, candidate)
-        correction = Correction(candidate, value + (0.0 if self.correction is None else self.correction.value))
+        columns, found = taken_out(self.step, candidate)
+        correction = found.beside(self.correction)
         left = correction.left(self.step.scene)
         step = replace(self.step, columns=columns, rest=None if left is None else left[0])
         return replace(self, step=step, correction=correction)

@@ -82,6 +82,14 @@ class SelectionStep:
             return model
         return replace(model, joints=self.variation.whitened_rows(model.joints))
 
+    @cached_property
+    def in_parts(self) -> FittedModel:
+        """The same model with parts of every recording as folds, for what each recording has of its own."""
+        owner = self.model.owner
+        count = np.bincount(owner)[owner]
+        place = np.arange(len(owner)) - np.searchsorted(owner, owner)
+        return replace(self.model, fold=place * self.criteria.parts // count)
+
     @property
     def offsets(self) -> RunVariation | None:
         """Offsets of runs, which fits take for noise whatever else rows weigh so, see `Estimate.offsets`."""
@@ -138,6 +146,17 @@ class SelectionStep:
         model : FittedModel, optional
             In the place of the step's; see `scara_ident.diagnosis.nonlinear_fit.freed_model`.
         """
+        own = [item for item in candidates if item.effect.of_each_recording]
+        if own and model is None:
+            # The others in their order, and each of these where it stood.
+            timed, others = (
+                iter(self.judge(items, first, each))
+                for items, each in (
+                    (own, self.in_parts),
+                    ([item for item in candidates if not item.effect.of_each_recording], self.model),
+                )
+            )
+            return [next(timed if item.effect.of_each_recording else others) for item in candidates]
         model = self.model if model is None else model
         rows = self.rows(self.scene, candidates) if first is None else self.rows_at_hand(first, candidates)
         found = examine(model, rows, self.criteria)

@@ -64,7 +64,7 @@ def validated(outcome: Outcome, data: PreparedData) -> Validation:
     """
     found, model = outcome.search, outcome.after
     robot, value = found.scene.robot, model.value
-    held = held_out_states(found, value, model.weights, data)
+    held = held_out_states(found, model, data)
     before = observe(found.base, held.data)
     after = _with_effects(found, held, before)
     unsure = unsure_of_others(model, after)
@@ -79,7 +79,7 @@ def validated(outcome: Outcome, data: PreparedData) -> Validation:
         events = [event for event in events if event.kind != "unknown" or np.isfinite(event.score)]
     quiet = quiet_blocks(held.data, events)
     undisturbed = after if np.all(quiet) else after.faded(quiet)
-    gains = held_out_gains(found, model, undisturbed, before, quiet)
+    gains = held_out_gains(found, model, undisturbed, before, quiet, held.correction)
     return Validation(before, after, tuple(events), undisturbed, gains, unsure, apart, held.notes)
 
 
@@ -87,9 +87,8 @@ def _with_effects(found: Search, held: HeldOut, before: Observations) -> Observa
     """Return held-out observations, corrected as the training ones were, with the effects found."""
     if not before.data.recordings:
         return replace(before, model=found.model)
-    if found.correction is not None:
-        data = corrected(before.data, found.correction.candidate, found.correction.value)
-        before = before.with_torque(data)
+    if held.correction is not None:
+        before = before.with_torque(corrected(before.data, held.correction))
     scene = replace(held.scene, columns=columns_at_hand(before))
     step = replace(found.step, scene=scene, columns=CandidateColumns(before), chosen=held.chosen)
     return observed_at_every_sample(step)

@@ -19,7 +19,7 @@ from scara_ident.estimation.assumed_variation import (
     ASSUMED_SCALE,
     assumed_variation,
 )
-from scara_ident.estimation.run_variation import LEAST_RUNS, RunVariation
+from scara_ident.estimation.run_variation import DELAY, LEAST_RUNS, RunVariation
 from scara_ident.estimation.variation_between import run_variation
 
 
@@ -44,7 +44,7 @@ def variation_objection(step: SelectionStep, decision: Decision, least_gain: flo
         differ more, and nothing is asked.
     """
     if decision.candidate.corrects_data:
-        return None
+        return _alike(step, decision) if decision.candidate.effect.of_each_recording else None
     variation = _variation_beside(step, decision)
     if not variation:
         return None
@@ -65,6 +65,18 @@ def variation_objection(step: SelectionStep, decision: Decision, least_gain: flo
     if gain < least_gain and not _dwarfs(step, decision, variation):
         return f"{why} it removes {max(gain, 0.0):.1%} of the squared residual, {least_gain:.0%} is asked"
     return None
+
+
+def _alike(step: SelectionStep, decision: Decision) -> str | None:
+    """Say so where joints do not agree that recordings are late by other times, or what else runs differ by may do as much."""
+    joints = with_columns(step.observations, step.columns.rows(step.scene, step.chosen))
+    variation = run_variation(step.observations, joints, step.model.root @ step.model.projected)
+    shared = variation.delays
+    if shared is None or not shared.differ:
+        chance = "" if shared is None else f" (p = {shared.p_value:.1e})"
+        return f"that recordings differ in it may be chance, by how the joints disagree{chance}"
+    (again,) = replace(step, variation=variation.without(DELAY) or step.variation).judge([decision.candidate])
+    return None if again.accepted else f"with what else runs differ by counted as noise, {again.why}"
 
 
 def _dwarfs(step: SelectionStep, decision: Decision, variation: RunVariation) -> bool:

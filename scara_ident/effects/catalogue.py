@@ -18,6 +18,7 @@ from scara_ident.effects.payload_intervals import PayloadInIntervals
 from scara_ident.effects.periodic import EncoderEccentricity, TorqueRipple, Vibration
 from scara_ident.effects.position import Spring
 from scara_ident.effects.presliding import Presliding
+from scara_ident.effects.recording_delays import DelayOfEachRecording
 from scara_ident.effects.shaft import CoupledShaft
 from scara_ident.effects.tilt import BaseTilt, NominalBaseTilt
 from scara_ident.registry import Registry
@@ -47,6 +48,7 @@ CATALOGUE: tuple[Effect, ...] = (
     TorqueSensorNonlinearity(),
     TorqueGainMismatch(),
     TimeDelay(),
+    DelayOfEachRecording(),
     JointZero(),
     JointElasticity(),
     Backlash(),

@@ -73,6 +73,8 @@ class Effect(ABC):
         that are in it add up to what all of them do, those of another are what it changes beside them.
     by_recording, in_intervals : bool
         Whether it acts in some recordings and not in others, see `in_recordings`, or in intervals that its member holds.
+    of_each_recording : bool
+        Whether each recording of the scene has a coefficient of its own, of which no other recording says anything.
     same_at_all_frequencies : bool
         Whether its coefficient is the same in any part of the band, so that another one there says that it is not it.
     in_small_ways : bool
@@ -105,6 +107,7 @@ class Effect(ABC):
     together: ClassVar[bool] = False
     by_recording: ClassVar[bool] = False
     in_intervals: ClassVar[bool] = False
+    of_each_recording: ClassVar[bool] = False
     same_at_all_frequencies: ClassVar[bool] = False
     in_small_ways: ClassVar[bool] = False
     of_state: ClassVar[bool] = False
@@ -348,6 +351,10 @@ class Effect(ABC):
     def negligible(self, scene: Scene, member: Member, value: Array) -> str | None:
         """Say why coefficients are too small to speak of, however sure; None where they are not."""
         return None
+
+    def alike(self, value: Array, covariance: Array) -> tuple[Array, Array]:
+        """Return what of coefficients (k,) all recordings have alike, and its covariance: all, unless each has its own."""
+        return value, covariance
 
     def leaves(self, scene: Scene, member: Member, value: Array) -> tuple[Effect, Member, float] | None:
         """Return what may be left of it in corrected recordings and is no part of an arm, and the band, Hz, that holds that."""

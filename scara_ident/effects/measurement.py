@@ -167,8 +167,7 @@ class TimeDelay(Effect):
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
         """Return ``-du/dt`` of the predicted torque."""
         rows = slice(None) if member.joint is None else slice(member.joint, member.joint + 1)
-        rate, band = signals.motion.rate, DERIVATIVE_BAND * signals.scene.band
-        change = -differentiate(signals.predicted[rows], rate, band if band < HIGHEST_CUT * rate else None)[1]
+        change = lacking(signals, signals.predicted[rows])
         return [change if member.joint is None else change[0]]
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
@@ -238,6 +237,12 @@ class PositionFilter(Effect):
         cut = band if band < HIGHEST_CUT * rate else None
         _, first, second = differentiate(signals.rigid, rate, cut)
         return [first, second, *differentiate(second, rate, cut)[1:]]
+
+
+def lacking(signals: Signals, torque: Array) -> Array:
+    """Return what a torque (k, N) lacks for each second that it is late, ``-du/dt``."""
+    rate, band = signals.motion.rate, DERIVATIVE_BAND * signals.scene.band
+    return -differentiate(torque, rate, band if band < HIGHEST_CUT * rate else None)[1]
 
 
 def shifted(recording: Recording, delay: float, joints: Sequence[int] | None = None) -> Recording:

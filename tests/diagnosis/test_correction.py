@@ -6,11 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from scara_ident.diagnosis.candidates import Candidate
-from scara_ident.diagnosis.correction import corrected, taken_out
+from scara_ident.diagnosis.correction import Correction, corrected, taken_out
 from scara_ident.effects import Member
 from scara_ident.effects.measurement import TimeDelay, shifted
+from scara_ident.effects.recording_delays import DelayOfEachRecording
 from scara_ident.estimation import wls
 from scara_ident.estimation.run_offsets import rms_of
 from scara_ident.model.model import TorqueModel
@@ -22,7 +24,7 @@ def test_corrected_torque_is_that_of_the_recording_corrected():
     late = [shifted(run, -0.004) for run in exact_runs()[:2]]
     candidate = Candidate(TimeDelay(), Member(None))
     data = observed(late).data
-    mended = corrected(data, candidate, np.array([0.004]))
+    mended = corrected(data, Correction(candidate, np.array([0.004]), ("A_1", "A_2")))
     for part, old, run in zip(mended.stretches, data.stretches, late, strict=True):
         whole = candidate.effect.corrected(run, candidate.member, np.array([0.004]))
         assert np.array_equal(part.torque, whole.effort)
@@ -43,8 +45,8 @@ def test_no_column_of_the_model_is_made_again_beside_another_torque(monkeypatch:
         return joint_columns(model, motion, *into)
 
     monkeypatch.setattr(TorqueModel, "joint_columns", columns)
-    own, value = taken_out(step, candidate)
-    assert value[0] == pytest.approx(0.025, abs=2e-4)
+    own, found = taken_out(step, candidate)
+    assert found.value[0] == pytest.approx(0.025, abs=2e-4)
     own.rows(replace(step.scene, value=1.01 * step.scene.value), [candidate])
     assert not made
 
@@ -53,10 +55,42 @@ def test_a_long_delay_is_taken_out_until_nothing_is_left():
     candidate = Candidate(TimeDelay(), Member(None))
     step = step_beside([shifted(run, -0.025) for run in exact_runs()[:2]])
     (first,) = step.judge([candidate])
-    columns, value = taken_out(step, candidate)
+    columns, found = taken_out(step, candidate)
     # Of first order, beside friction and inertia that stand for some of it, it is far off.
     assert abs(first.examination.value[0] - 0.025) > 1e-3
-    assert value[0] == pytest.approx(0.025, abs=2e-4)
+    assert found.value[0] == pytest.approx(0.025, abs=2e-4)
     clean = step_beside(exact_runs()[:2]).observations
     left, without = (rms_of(wls(item).value, item) for item in (columns.observations, clean))
     assert left == pytest.approx(without, rel=0.02)
+
+
+def test_each_recording_is_corrected_by_its_own_and_what_all_have_alike_counts_for_each():
+    late = (0.004, 0.0, -0.002, 0.006)
+    step = step_beside([shifted(run, -own) for run, own in zip(exact_runs(), late, strict=True)])
+    columns, found = taken_out(step, Candidate(DelayOfEachRecording(), Member(None)))
+    assert found.recordings == ("A_1", "A_2", "B_1", "B_2")
+    (first,) = step.judge([Candidate(DelayOfEachRecording(), Member(None))])
+    std = np.sqrt(np.diag(first.examination.covariance))
+    assert np.all(std < 1e-3)
+    assert np.all(np.abs(found.value - late) < 3.0 * std)
+    assert found.of("B_2") == found.value[3:]
+    left, without = (
+        rms_of(wls(item).value, item) for item in (columns.observations, step_beside(exact_runs()).observations)
+    )
+    assert left == pytest.approx(without, rel=0.02)
+    alike = Correction(Candidate(TimeDelay(), Member(None)), np.array([0.001]), found.recordings)
+    for both in (found.beside(alike), alike.beside(found)):
+        assert both.of_each
+        assert_allclose(both.value, found.value + 0.001)
+    assert alike.of("B_2") == alike.value
+    assert alike.beside(None) is alike
+
+
+def test_a_torque_scale_of_a_run_is_not_taken_for_its_delay():
+    """Of a short motion the rate of the torque is no stranger to the torque: delays of 4.5 ms came out as 5.6."""
+    runs = [replace(run, effort=run.effort * (1.0 + 0.03 * k)) for k, run in enumerate(exact_runs())]
+    step, candidate = step_beside(runs), Candidate(DelayOfEachRecording(), Member(None))
+    _, found = taken_out(step, candidate)
+    assert_allclose(found.value, 0.0, atol=1e-3)
+    (first,) = step.judge([candidate])
+    assert np.max(np.abs(first.examination.value)) > 5e-3

@@ -13,7 +13,7 @@ from scara_ident.diagnosis.held_out_states import FIRST_PART, held_out_states
 from scara_ident.diagnosis.search import Search, SearchTask, search
 from scara_ident.diagnosis.selection_step import observed_at_every_sample
 from scara_ident.effects.payload import PayloadOfRecordings
-from scara_ident.estimation import wls
+from scara_ident.estimation import Estimate, wls
 from scara_ident.estimation.observations import observe
 from scara_ident.model.model import build_model
 from scara_ident.motion.prepared import prepare
@@ -29,20 +29,19 @@ def runs(*masses: float, first: int = 0) -> list[Recording]:
 
 
 @lru_cache
-def found() -> tuple[Search, np.ndarray, np.ndarray]:
-    """A search that found a payload in two of four recordings, parameters and weights."""
+def found() -> tuple[Search, Estimate]:
+    """A search that found a payload in two of four recordings, and its estimate."""
     observations = observe(build_model(load_robot()), prepare(runs(0.0, 1.5, 0.0, 1.5), BANDS))
     result = search(SearchTask(observations.model, (PayloadOfRecordings(),)), CandidateColumns(observations))
-    after = wls(observed_at_every_sample(result.step))
-    return result, after.value, after.weights
+    return result, wls(observed_at_every_sample(result.step))
 
 
 def test_a_payload_is_told_by_the_first_part_and_errors_are_of_the_rest():
-    result, value, weights = found()
+    result, after = found()
     (effect,) = result.chosen
     assert effect.effect.description(result.scene, effect.member) == "a payload in r_1, r_3, not in the others"
     held = prepare(runs(1.5, 0.0, first=10), BANDS)
-    states = held_out_states(result, value, weights, held)
+    states = held_out_states(result, after, held)
     (now,) = states.chosen
     assert now.effect.description(states.scene, now.member) == "a payload in r_1, r_3, r_10, not in the others"
     # A gear transmits it in these recordings too.
@@ -58,19 +57,19 @@ def test_a_payload_is_told_by_the_first_part_and_errors_are_of_the_rest():
 
 
 def test_the_rest_of_a_recording_does_not_say_what_it_carries():
-    result, value, weights = found()
+    result, after = found()
     (run,) = runs(0.0, first=20)
     late = run.time > run.time[0] + 0.4 * np.ptp(run.time)
     other = made(load_robot(), 20, "r_20", 1.5)
     mixed = replace(run, effort=np.where(late, other.effort, run.effort))
-    states = held_out_states(result, value, weights, prepare([mixed], BANDS))
+    states = held_out_states(result, after, prepare([mixed], BANDS))
     assert states.chosen == result.chosen
 
 
 def test_without_such_an_effect_held_out_recordings_stay_whole():
-    result, value, weights = found()
+    result, after = found()
     bare = replace(result, step=replace(result.step, chosen=()))
     held = prepare(runs(0.0, first=10), BANDS)
-    states = held_out_states(bare, value, weights, held)
+    states = held_out_states(bare, after, held)
     assert states.data is held
     assert states.notes == ()

@@ -42,7 +42,7 @@ class Hook(Effect):
 
 @lru_cache(maxsize=1)
 def scene_of_ur5():
-    return scene_of(load_robot(example_urdf("ur5_robot.urdf")), start={"m": 0.0, "other_1": 5.0})
+    return scene_of(load_robot(example_urdf("ur5_robot.urdf")), start={"m": 0.0, "other_1": 5.0, "other_2": 9.0})
 
 
 def members(effect, scene):

@@ -1,0 +1,91 @@
+"""Effort that is late by another time in each recording."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+
+from scara_ident.arrays import Array
+from scara_ident.effects.effect import DOUBT_STDS
+from scara_ident.effects.friction import friction_of
+from scara_ident.effects.measurement import SAMPLING, TimeDelay, lacking
+from scara_ident.effects.parameters import Member, Parameter, deviation
+from scara_ident.effects.signals import Scene, Signals
+from scara_ident.estimation.run_variation import LEAST_RUNS
+from scara_ident.model.terms import Column
+
+# A column for each recording on the rows of all: of so many recordings as many numbers as the rigid body of six joints has.
+# Of more the delay of all is corrected alone, and that they differ is said.
+MOST_RECORDINGS = 36
+
+
+class DelayOfEachRecording(TimeDelay):
+    """Effort of all joints that is recorded later than position, by another time in each recording.
+
+    Clocks that are started anew for each recording, or a logger that waits, make such delays. One of all recordings is their
+    mean, and what is left then looks like elastic gears. They come in where the joints agree that the recordings differ,
+    see `scara_ident.estimation.shared_delays`, and are corrected as that of all is; a held-out recording tells its own by its first part.
+
+    When friction turns is left to no column: samples of a jump are up to half an interval off, and friction that builds up over a
+    distance is late too. A delay that is there takes that along once it is corrected.
+    """
+
+    summary = "effort that is recorded later than position, by another time in each recording"
+    of_each_recording = True
+
+    def members(self, scene: Scene) -> tuple[Member, ...]:
+        """Return one for all joints, of recordings that are enough to say that they differ."""
+        return (Member(None),) if LEAST_RUNS <= len(scene.start) <= MOST_RECORDINGS else ()
+
+    def columns(self, scene: Scene, member: Member) -> tuple[Column, ...]:
+        """Describe the delay of each recording."""
+        return tuple(
+            Column(f"delay_{name}", None, "s", f"delay of the effort of all joints behind position in {name}")
+            for name in scene.start
+        )
+
+    def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
+        """Return ``-du/dt`` of the predicted torque less Coulomb friction in the recording whose delay it is, else zero."""
+        coulomb = [friction_of(signals.scene, joint).get(0, 0.0) for joint in range(signals.scene.robot.n)]
+        own = lacking(signals, signals.predicted - np.array(coulomb)[:, None] * signals.sign)
+        nothing = np.zeros_like(own)
+        return [own if name == signals.motion.name else nothing for name in signals.scene.start]
+
+    def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
+        """Say so where no loop is that late."""
+        place = int(np.argmax(np.abs(value) - DOUBT_STDS * std))
+        return super().inadmissible(scene, member, value[place : place + 1], std[place : place + 1])
+
+    def settled(self, value: Array) -> bool:
+        """Whether the delay of every recording is."""
+        return super().settled(value[np.argmax(np.abs(value))][None])
+
+    def negligible(self, scene: Scene, member: Member, value: Array) -> str | None:
+        """Say so where that of no recording is longer than a sample."""
+        largest = float(np.max(np.abs(value)))
+        if len(value) == 1 or largest * scene.rate > SAMPLING:
+            return super().negligible(scene, member, value[:1]) if len(value) == 1 else None
+        return (
+            f"effort and position are {1e3 * float(np.min(value)):+.2g} to {1e3 * float(np.max(value)):+.2g} ms apart, by another "
+            "time in each recording, less than one sample"
+        )
+
+    def alike(self, value: Array, covariance: Array) -> tuple[Array, Array]:
+        """Return the mean of the recordings, with their scatter as what it is unsure by."""
+        count = len(value)
+        apart = float(np.var(value, ddof=1)) if count > 1 else 0.0
+        return np.mean(value, keepdims=True), np.full((1, 1), np.mean(covariance) + apart / count)
+
+    def leaves(self, scene: Scene, member: Member, value: Array) -> None:
+        """Return nothing: a filter of the positions is the same in all recordings."""
+
+    def or_else(self, scene: Scene, member: Member, value: Array) -> str:
+        """Say which of both is late where the mean is negative."""
+        return super().or_else(scene, member, np.mean(value, keepdims=True))
+
+    def parameters(self, scene: Scene, member: Member, value: Array, covariance: Array) -> Mapping[str, Parameter]:
+        """Return the mean delay, and that of each recording."""
+        mean, unsure = self.alike(value, covariance)
+        each = super().parameters(scene, member, value, covariance)
+        return {"delay": Parameter(float(mean[0]), deviation(unsure), "s"), **each}

@@ -1,0 +1,70 @@
+"""A delay of each recording: its columns, its mean, and that of no recording in another's."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from scara_ident.effects import Member
+from scara_ident.effects.measurement import TimeDelay
+from scara_ident.effects.recording_delays import MOST_RECORDINGS, DelayOfEachRecording
+from scara_ident.estimation.run_variation import LEAST_RUNS
+from scara_ident.robot.robot import load_robot
+from tests.effects.scenes import columns, moving, scene_of
+
+EFFECT, ARM = DelayOfEachRecording(), Member(None)
+
+
+def scene(*names: str):
+    return scene_of(load_robot(), start={name: 0.0 for name in names or ("a_1", "m", "b_1")})
+
+
+def test_each_recording_has_a_column_that_is_zero_in_all_others():
+    item = moving(load_robot(), 1.0)
+    assert item.name == "m"
+    found = columns(EFFECT, scene(), item, ARM)
+    # When Coulomb friction turns is no part of them.
+    here = scene()
+    names = np.array(here.model.names)
+    smooth = replace(here, value=np.where(np.char.startswith(names, "a0"), 0.0, here.value))
+    assert_allclose(found[:, [1]], columns(TimeDelay(), smooth, item, ARM), rtol=1e-6, atol=1e-9)
+    assert not np.allclose(found[:, [1]], columns(TimeDelay(), here, item, ARM))
+    assert not np.any(found[:, [0, 2]])
+    assert [column.name for column in EFFECT.columns(scene(), ARM)] == ["delay_a_1", "delay_m", "delay_b_1"]
+    assert not np.any(columns(EFFECT, scene(), replace(item, name="c_1"), ARM))
+
+
+def test_it_is_tried_where_recordings_are_enough_and_not_too_many():
+    names = [f"r_{k}" for k in range(MOST_RECORDINGS + 1)]
+    assert [bool(EFFECT.members(scene(*names[:count]))) for count in (LEAST_RUNS - 1, LEAST_RUNS)] == [False, True]
+    assert [bool(EFFECT.members(scene(*names[:count]))) for count in (-1, None)] == [True, False]
+
+
+def test_the_mean_is_unsure_by_how_much_recordings_differ():
+    value, covariance = np.array([0.001, 0.004, 0.004]), np.diag([4e-8, 1e-8, 4e-8])
+    found = EFFECT.parameters(scene(), ARM, value, covariance)
+    assert found["delay"].value == pytest.approx(0.003)
+    # Of a mean of three the variances over nine, and what they scatter by over three.
+    assert found["delay"].std == pytest.approx(np.sqrt(9e-8 / 9.0 + 3e-6 / 3.0))
+    assert [found[f"delay_{name}"].value for name in ("a_1", "m", "b_1")] == value.tolist()
+    assert found["delay_m"].std == pytest.approx(1e-4)
+    one = EFFECT.alike(value[:1], covariance[:1, :1])
+    assert (one[0].tolist(), one[1].tolist()) == ([0.001], [[4e-8]])
+
+
+def test_what_is_asked_of_a_delay_is_asked_of_the_largest():
+    here = replace(scene(), rate=500.0)
+    small, large = np.array([0.001, -0.0005, 0.0]), np.array([0.001, -0.003, 0.0])
+    assert "-0.5 to +1 ms apart, by another time in each recording" in EFFECT.negligible(here, ARM, small)
+    assert EFFECT.negligible(here, ARM, large) is None
+    assert (
+        EFFECT.inadmissible(here, ARM, 30.0 * large, np.full(3, 1e-4))
+        == "a delay of -0.09 s is longer than any measurement's"
+    )
+    assert EFFECT.inadmissible(here, ARM, large, np.full(3, 1e-4)) is None
+    assert EFFECT.settled(np.array([1e-6, -1e-5])) and not EFFECT.settled(np.array([0.0, -1e-4]))
+    assert "by less than nothing" in EFFECT.or_else(here, ARM, large)
+    assert EFFECT.leaves(here, ARM, large) is None
