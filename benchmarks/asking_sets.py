@@ -93,7 +93,7 @@ def seen(found: Diagnosis, first: Diagnosis, question: Question, runs: Sequence[
     inquiry, scene = inquire(first, [question]), found.search.scene
     data, _, _ = usable_in_bands(scene.model, runs, (), found.search.bands, alike=True)
     if (taken := found.search.correction) is not None:
-        data = corrected(data, taken.candidate, taken.value)
+        data = corrected(data, taken)
     columns = CandidateColumns(observe(scene.model, data))
     made = inquiry.rows(lambda wanted: columns.rows(scene, wanted))
     wide = {item.label: rows for item, rows in zip(inquiry.suspects, made, strict=True)}

@@ -170,7 +170,7 @@ def _found(effect: Item) -> Item:
 def _corrected(result: Diagnosis) -> dict[str, float]:
     """Return what was taken out of the data, though it may be too small to be called an effect."""
     correction = result.search.correction
-    return {} if correction is None else {correction.candidate.effect.name: float(correction.value[0])}
+    return {} if correction is None else {correction.candidate.effect.name: float(np.mean(correction.value))}
 
 
 def _of(effect: Any, name: str) -> Any:
@@ -255,7 +255,7 @@ def _all_fitted(
         step = tune(step)
         if late:
             columns, more = taken_out(step, Candidate(TimeDelay(), Member(None)))
-            step, delay = replace(step, columns=columns), delay + float(more[0])
+            step, delay = replace(step, columns=columns), delay + float(more.value[0])
     return model_with(step.scene, step.chosen), wls(observed_at_every_sample(step)).value, delay
 
 

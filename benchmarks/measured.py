@@ -47,7 +47,7 @@ def rows_on(step: SelectionStep, found: Search, data: PreparedData) -> Observati
     """Return the rows of a step's model on other recordings, corrected as the training ones were."""
     rows = observe(found.base, data)
     if found.correction is not None:
-        rows = rows.with_torque(corrected(rows.data, found.correction.candidate, found.correction.value))
+        rows = rows.with_torque(corrected(rows.data, found.correction))
     scene = replace(step.scene, columns=columns_at_hand(rows))
     return observed(replace(step, scene=scene, columns=CandidateColumns(rows)))
 
