@@ -173,7 +173,9 @@ def contradicted() -> tuple[Diagnosis, HeldOutGain]:
     value[len(result.before.value) :] *= -1.0
     after = replace(result.after, value=value)
     held = result.validation_after
-    (gain,) = held_out_gains(result.search, after, held, result.validation_before, np.ones(len(held.owner))).values()
+    (gain,) = held_out_gains(
+        result.search, after, held, result.validation_before, np.ones(len(held.owner)), result.search.correction
+    ).values()
     return replace(result, effects=(replace(result.effects[0], held_out=gain),)), gain
 
 
@@ -221,7 +223,7 @@ def test_what_is_left_is_not_called_noise_then(monkeypatch: pytest.MonkeyPatch):
 def test_without_recordings_held_out_nothing_is_said():
     result = found(UNEVEN, UNEVEN)
     none = replace(result.validation_after, data=replace(result.validation_after.data, recordings=()))
-    assert held_out_gains(result.search, result.after, none, result.validation_before, np.ones(0)) == {}
+    assert held_out_gains(result.search, result.after, none, result.validation_before, np.ones(0), None) == {}
     alone = replace(result, effects=(replace(result.effects[0], held_out=None),))
     assert [item["held_out"] for item in diagnosis_dict(alone)["effects"]] == [None]
     assert "held out" not in repr(_effect_words(alone.effects[0], DiagnosisContext(alone))[0])
