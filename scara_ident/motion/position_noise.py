@@ -217,6 +217,12 @@ def forget_noisier(data: PreparedData) -> None:
     _NOISIER.pop(data, None)
 
 
+def forget_stepless(data: PreparedData) -> None:
+    """Forget the positions without steps that steps were drawn on."""
+    for part in data.stretches:
+        part.stretch.forget_filtered((STEPLESS * part.rate,))
+
+
 def _drawn(data: PreparedData, seed: int) -> PreparedData:
     rng = np.random.default_rng(seed)
     recordings = []
