@@ -118,7 +118,7 @@ class Event:
 
     def sentence(self, robot: Robot) -> str:
         """Return it in words."""
-        force = "" if self.force is None else f", {np.linalg.norm(self.force):.3g} N at the tool"
+        force = "" if self.force is None else f", {np.linalg.norm(self.force):.3g} N if at the tool"
         units = robot.torque_units
         where = ", ".join(f"{size:.3g} {units[joint]} on {joint}" for joint, size in self.sized)
         others = self.joints[len(self.sized) :]
