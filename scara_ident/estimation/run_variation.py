@@ -138,7 +138,7 @@ class RunVariation:
             shown = [
                 "what follows the slope of its torque by more than any delay would"
                 if kind == "delay" and std > item.reach
-                else f"its {kind} by {unit.format(std * scale)}"
+                else f"its {kind} by {'more than all of it' if scale == 100 and std > 1.0 else unit.format(std * scale)}"
                 for kind, std, size, unit, scale in zip(KINDS, item.std, rms, units, (100, 100, 1, 1000), strict=True)
                 if std * size > least and not (late and kind == "delay")
             ]

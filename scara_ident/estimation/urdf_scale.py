@@ -188,7 +188,7 @@ def _compared(
     if scales is None:
         return f"{said}."
     if not scales:
-        return f"{said}; the URDF's masses do not show in these torques."
+        return f"{said}; whether the torques are those of the URDF's bodies, these recordings do not tell."
     # A scale that all joints share is one, whatever each of them bears.
     shared = _alike(scales.values()) and any(joint not in slight for joint in scales)
     little = {joint: scales[joint] for joint in slight if joint in scales and not 1.0 / USUAL < scales[joint] < USUAL}

@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose
 from scara_ident.diagnosis.diagnose import diagnose
 from scara_ident.estimation import Estimate, wls
 from scara_ident.estimation.run_offsets import beside_offsets
-from scara_ident.estimation.run_variation import KINDS, RunVariation
+from scara_ident.estimation.run_variation import KINDS, JointVariation, RunVariation
 from scara_ident.estimation.variation_between import run_variation
 from scara_ident.paper import table5_parameters
 from scara_ident.recording.recording import Recording
@@ -125,6 +125,14 @@ def test_more_than_a_radian_of_the_band_is_no_delay(apart: float):
     assert "what follows the slope of its torque by more than any delay would" in said
     near = replace(item, std=0.5 * item.reach * delay, of_run=np.outer([0.5 * item.reach] * 4, delay))
     assert "lags by" in " ".join(RunVariation((near, None)).sentences(ROBOT))
+
+
+def test_what_differs_by_more_than_itself_is_given_no_share():
+    """`its friction by 1e+04 %` was said of a joint whose friction the fit left at nothing."""
+    std = np.array([100.0, 0.0, 0.0, 0.0])
+    item = JointVariation(np.ones((4, 6)), std, np.zeros((3, 4)), 0.01, np.array([0, 2, 4, 6]), np.zeros((3, 4)))
+    said = RunVariation((item, None)).sentences(ROBOT)
+    assert said == ["joint1 differs from run to run (standard deviation): its friction by more than all of it"]
 
 
 def test_of_two_runs_no_more_is_said_than_their_offsets():

@@ -95,7 +95,10 @@ def test_a_urdf_that_does_not_show_says_nothing_of_scale(arm):
     assert run.effort is not None
     rng = np.random.default_rng(2)
     assert scales(robot, replace(run, effort=rng.standard_normal(run.effort.shape)), (1.0, 1.0)) == {}
-    assert scale_sentence({}, robot).endswith("the URDF's masses do not show in these torques.")
+    # A KUKA's second joint follows its URDF with a correlation of 0.998, in too few samples to tell the scale.
+    assert scale_sentence({}, robot).endswith(
+        "whether the torques are those of the URDF's bodies, these recordings do not tell."
+    )
     assert scale_sentence(None, robot) == (
         "No recording tells a scale common to all torques and masses: it rests on effort_gain."
     )
