@@ -214,7 +214,8 @@ def _compared(
         same = "those of the URDF" if spread == "1" else f"{spread} times the URDF's"
         return f"{said}. Torques of the bodies are {same}."
     asked = "are effort_gain and effort_side right?" if geared else "is effort_gain right?"
-    if _alike(scales.values()):
+    # Of few joints it is not known whether it is all that are scaled.
+    if _alike(scales.values()) and 2 * len(scales) > robot.n:
         return f"{said}. All inertial parameters are {middle:.2g} of the URDF's: {asked}"
     odd = ", ".join(
         f"{scale:.2g} times the URDF's on {joint}"

@@ -84,6 +84,13 @@ def test_joints_that_differ_are_named(arm):
     assert said.endswith("Torques of the bodies are 30 times the URDF's on j2: is effort_gain right?")
 
 
+def test_the_scale_of_one_joint_of_many_is_not_that_of_all(arm):
+    """`All inertial parameters are 2.2 of the URDF's` rested on the fifth of six joints."""
+    robot, _ = arm
+    said = scale_sentence({"j2": 3.0}, robot)
+    assert said.endswith("Torques of the bodies are 3 times the URDF's on j2: is effort_gain right?")
+
+
 def test_behind_a_gear_the_side_may_be_wrong_too(arm):
     robot, _ = arm
     geared = replace(robot, reduction=np.array([100.0, 100.0]))
