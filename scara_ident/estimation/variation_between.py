@@ -7,7 +7,7 @@ How far runs lie from one another along each kind of difference is a variance co
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -95,7 +95,10 @@ def variation_between(
     lost = np.ones(len(joints)) if taken is None else taken
     told = [(item, off) for item, off in zip(sums, lost, strict=True) if item is not None]
     estimated = iter(_estimated(*zip(*told, strict=True)) if told else ())
-    return RunVariation(tuple(None if item is None else next(estimated) for item in sums))
+    found = [None if item is None else next(estimated) for item in sums]
+    reaches = [np.inf if band is None else 1.0 / (2.0 * np.pi * band) for band in observations.data.bands]
+    pairs = zip(found, reaches, strict=True)
+    return RunVariation(tuple(None if item is None else replace(item, reach=reach) for item, reach in pairs))
 
 
 @dataclass(frozen=True, eq=False)

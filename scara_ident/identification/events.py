@@ -125,7 +125,8 @@ class Event:
         more = f" and {', '.join(others)}" if others else ""
         done = "" if self.held_out else "; left out of the fit"
         if np.isinf(self.score):
-            return f"{self.recording} is explained much worse than the recordings fitted ({self.kind}): {where}{more}{done}"
+            why = "" if self.kind == "unknown" else f" ({self.kind})"
+            return f"{self.recording} is explained much worse than the recordings fitted{why}: {where}{more}{done}"
         unsure = [
             f", {word} between {least:.2f} and {most:.2f} s"
             for word, (least, most) in (("beginning", self.begins or (0.0, 0.0)), ("ending", self.ends or (0.0, 0.0)))

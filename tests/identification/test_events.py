@@ -140,6 +140,13 @@ def test_each_joint_has_its_own_size_the_largest_first():
     assert "rms_by_joint" not in known.entry
 
 
+def test_of_a_recording_explained_worse_for_no_known_reason_none_is_given():
+    whole = Event("run", 0.0, 12.0, ("joint1",), 0.5, "unknown", held_out=True)
+    assert whole.sentence(ROBOT) == "run is explained much worse than the recordings fitted: 0.5 N m on joint1"
+    unsure = replace(whole, kind="parameters unsure").sentence(ROBOT)
+    assert unsure.startswith("run is explained much worse than the recordings fitted (parameters unsure): ")
+
+
 def test_of_very_many_events_the_strongest_are_said():
     scores = np.random.default_rng(0).permutation(MOST_SAID + 5)
     events = [
