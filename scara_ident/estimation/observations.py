@@ -23,6 +23,7 @@ from scara_ident.estimation.residuals import Residuals
 from scara_ident.estimation.sample_columns import Raw, SampleColumns, few_enough
 from scara_ident.manners import Frozen
 from scara_ident.model.model import TorqueModel
+from scara_ident.model.terms.friction import Friction
 from scara_ident.motion.position_noise import coarse_positions
 from scara_ident.motion.prepared import PreparedData, PreparedRecording, PreparedStretch
 from scara_ident.threads import THREADS, side_by_side
@@ -196,19 +197,44 @@ class Observations(Frozen):
 
         That of the last parameters is kept.
         """
+        return self._of_last("_late", value, lambda: self._lacking(self.predicted(value)))
+
+    def late_reversals(self, value: Array) -> tuple[Array, ...]:
+        """Return the same of Coulomb friction alone, which changes where a joint reverses: presliding makes it late too.
+
+        That of the last parameters is kept.
+        """
 
         def made() -> tuple[Array, ...]:
-            torques = zip(self.data.stretches, self.predicted(value), strict=True)
-            parts = [(part, torque) for part, torque in torques if part.usable]
+            raws = chain.from_iterable(self.raw)
+            return self._lacking([np.array([self.dry(j, value, row) for j, row in enumerate(raw)]) for raw in raws])
 
-            def of_joint(joint: int) -> Array:
-                # A torque that comes late lacks so much of its rate.
-                rates = ((part, -np.gradient(torque[joint], 1.0 / part.rate)) for part, torque in parts)
-                return np.concatenate([part.rows(joint, rate[None])[0] for part, rate in rates])
+        return self._of_last("_late_reversals", value, made)
 
-            return tuple(side_by_side(of_joint, range(len(self.joints))))
+    def dry(self, joint: int, value: Array, columns: Array) -> Array:
+        """Return the Coulomb friction of a joint by parameters and its columns (k, N) at every sample, shape (N,)."""
+        dry = self.of_speed(joint, 0)
+        return np.asarray(value[self.joints[joint].columns[dry]] @ columns[dry])
 
-        return self._of_last("_late", value, made)
+    def of_speed(self, joint: int, power: int) -> NDArray[np.bool_]:
+        """Return which columns of a joint are of friction with a power of speed, shape (k,)."""
+        found = [
+            self.model.place(term).start + np.flatnonzero(term.of_power(power))
+            for term in self.model.terms
+            if isinstance(term, Friction)
+        ]
+        return np.isin(self.joints[joint].columns, np.concatenate([np.zeros(0, dtype=np.intp), *found]))
+
+    def _lacking(self, torques: Sequence[Array]) -> tuple[Array, ...]:
+        """Return for each joint what a torque on every stretch (n, N) lacks on its rows for each second it is late."""
+        parts = [(part, torque) for part, torque in zip(self.data.stretches, torques, strict=True) if part.usable]
+
+        def of_joint(joint: int) -> Array:
+            # A torque that comes late lacks so much of its rate.
+            rates = ((part, -np.gradient(torque[joint], 1.0 / part.rate)) for part, torque in parts)
+            return np.concatenate([part.rows(joint, rate[None])[0] for part, rate in rates])
+
+        return tuple(side_by_side(of_joint, range(len(self.joints))))
 
     def _of_last(self, name: str, value: Array, made: Callable[[], tuple[Array, ...]]) -> tuple[Array, ...]:
         """Return what is kept of the last parameters, made anew where these are others."""

@@ -5,6 +5,9 @@ whole of it, so that blocks of one run say the same and their scatter knows noth
 direction on the rows of a run, such as the friction that the model predicts; how far runs lie from one another along
 these directions is a variance component (Searle, Casella and McCulloch 1992, "Variance Components"), estimated by
 restricted maximum likelihood. A component that chance explains is left out.
+
+What a model lacks of one joint may look like a delay of it, above all friction where the joint reverses. Of a delay it is said
+only where all joints tell it, away from reversals: `scara_ident.estimation.shared_delays`.
 """
 
 from __future__ import annotations
@@ -20,13 +23,19 @@ from scara_ident.arrays import Array
 from scara_ident.estimation.days import same_day, widening
 from scara_ident.estimation.joint_rows import JointRows
 from scara_ident.estimation.observations import Observations
+from scara_ident.estimation.shared_delays import SharedDelays
 from scara_ident.model.model import TorqueModel
 from scara_ident.model.terms.friction import Friction, Offset
 from scara_ident.model.terms.term import Term
 from scara_ident.robot.robot import Robot
 
 KINDS = ("friction", "torque scale", "offset", "delay")
-OFFSET = KINDS.index("offset")
+SCALE, OFFSET = KINDS.index("torque scale"), KINDS.index("offset")
+DELAY = KINDS.index("delay")
+# A delay of one joint that the recordings as a whole do not show is called this.
+LIKE_DELAY = "like a delay"
+# As each is called where it differs.
+_DIFFERING = (*(f"its {kind}" for kind in KINDS[:DELAY]), "what looks like a delay, which the joints do not share,")
 
 # With fewer recordings than this none can be told from the parameters.
 LEAST_RUNS = 3
@@ -78,6 +87,14 @@ class JointVariation:
     reach: float = np.inf
 
     @property
+    def apart(self) -> Array:
+        """Standard deviation of the runs about their mean, shape (kinds,): of a delay no parameter takes that up, and ``std`` has it too."""
+        found = self.std.copy()
+        if not self.assumed:
+            found[DELAY] = np.std(self.of_run[:, DELAY], ddof=1)
+        return found
+
+    @property
     def off(self) -> Array:
         """By how much the rows of every run lie off those of the mean run, shape (N,)."""
         return np.asarray(np.sum(np.repeat(self.of_run, np.diff(self.bounds), axis=0).T * self.directions, axis=0))
@@ -106,14 +123,27 @@ class JointVariation:
 
 @dataclass(frozen=True, eq=False)
 class RunVariation:
-    """How runs differ, joint by joint; None where they do not."""
+    """How runs differ, joint by joint; None where they do not.
+
+    Attributes
+    ----------
+    delays : SharedDelays or None
+        By how much each run is late as all joints tell it; None where they were not asked.
+    """
 
     joints: tuple[JointVariation | None, ...]
+    delays: SharedDelays | None = None
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """What each kind is called: of a delay that joints do not share it is not said that it is one."""
+        late = KINDS[DELAY] if self.delays is None or self.delays.differ else LIKE_DELAY
+        return (*KINDS[:DELAY], late, *KINDS[DELAY + 1 :])
 
     def sizes(self, robot: Robot) -> dict[str, dict[str, float]]:
         """Return the standard deviation of each kind by joint and kind, of those that differ."""
         return {
-            joint: {kind: float(std) for kind, std in zip(KINDS, item.std, strict=True) if std > 0.0}
+            joint: {kind: float(std) for kind, std in zip(self.kinds, item.apart, strict=True) if std > 0.0}
             for joint, item in zip(robot.joints, self.joints, strict=True)
             if item is not None
         }
@@ -126,25 +156,30 @@ class RunVariation:
         unexplained : str, optional
             Joint of which no model explains the torque: what it lacks differs from motion to motion too.
         """
+        shared = self.delays if self.delays is not None and self.delays.differ else None
         found = []
         for j, (joint, item) in enumerate(zip(robot.joints, self.joints, strict=True)):
             if item is None:
                 continue
             rms = np.sqrt(np.mean(item.directions**2, axis=1))
-            late, least = late_alike(item), SPOKEN_OF * rms[KINDS.index("torque scale")]
-            if abs(late) * rms[KINDS.index("delay")] > least:
+            late, least = late_alike(item), SPOKEN_OF * rms[SCALE]
+            if shared is None and abs(late) * rms[DELAY] > least:
                 found.append(f"{joint} {late_words(item, late)} in all runs alike")
             units = ("{:.2g} %", "{:.2g} %", "{:.2g} " + robot.torque_unit(j), "{:.2g} ms")
+            scales = (100, 100, 1, 1000)
             shown = [
                 "what follows the slope of its torque by more than any delay would"
-                if kind == "delay" and std > item.reach
-                else f"its {kind} by {'more than all of it' if scale == 100 and std > 1.0 else unit.format(std * scale)}"
-                for kind, std, size, unit, scale in zip(KINDS, item.std, rms, units, (100, 100, 1, 1000), strict=True)
-                if std * size > least and not (late and kind == "delay")
+                if what == _DIFFERING[DELAY] and std > item.reach
+                else f"{what} by {'more than all of it' if scale == 100 and std > 1.0 else unit.format(std * scale)}"
+                for what, std, size, unit, scale in zip(_DIFFERING, item.apart, rms, units, scales, strict=True)
+                if std * size > least and not ((late or shared is not None) and what == _DIFFERING[DELAY])
             ]
             if shown:
                 said = f"{joint} differs from run to run (standard deviation): {', '.join(shown)}"
                 found.append(said + ("; what is unexplained may make it seem so" if joint == unexplained else ""))
+        if shared is not None and shared.share > SPOKEN_OF:
+            size = f"standard deviation {1e3 * shared.std:.2g} ms"
+            found.append(f"effort comes late by another time in each run, on all joints alike ({size})")
         return found
 
     def __bool__(self) -> bool:
@@ -163,7 +198,7 @@ class RunVariation:
             None if item is None else replace(item, std=item.std * told, of_run=item.of_run * told)
             for item in self.joints
         ]
-        return RunVariation(tuple(joints))
+        return replace(self, joints=tuple(joints))
 
     def whitened_rows(self, joints: Sequence[JointRows]) -> tuple[JointRows, ...]:
         """Return the rows of every joint, see `JointVariation.whitened`."""
@@ -253,7 +288,7 @@ class RunVariation:
 
 def late_alike(item: JointVariation) -> float:
     """Return by how much every run is late, s, where they differ little in it; 0 where they do not."""
-    late = item.of_run[:, KINDS.index("delay")]
+    late = item.of_run[:, DELAY]
     mean, apart = float(np.mean(late)), float(np.std(late, ddof=1))
     return mean if abs(mean) >= ALIKE * apart else 0.0
 
@@ -267,6 +302,8 @@ def late_words(item: JointVariation, late: float) -> str:
 
 def unit_of_kind(robot: Robot, joint: str, kind: str) -> str:
     """Return the unit in which runs differ by a kind on a joint; 1 for a share of what the model predicts."""
+    if kind == LIKE_DELAY:
+        return "s"
     units = ("1", "1", robot.torque_unit(robot.joints.index(joint)), "s")
     return units[KINDS.index(kind)]
 

@@ -16,16 +16,22 @@ from scara_ident.arrays import Array
 from scara_ident.estimation.joint_rows import JointRows
 from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.run_variation import (
+    DELAY,
     KINDS,
     LEAST_RUNS,
     OFFSET,
     RANK,
+    SCALE,
     JointVariation,
     RunVariation,
     directions_of,
 )
+from scara_ident.estimation.shared_delays import SharedDelays, shared_delays
 from scara_ident.estimation.variance_components import components, expected
 from scara_ident.threads import side_by_side
+
+# Beside delays that joints share reversals and viscous friction are free in every run.
+FREE = 2
 
 
 def run_variation(
@@ -56,7 +62,10 @@ def run_variation(
     if runs < (2 if of_two else LEAST_RUNS):
         return RunVariation((None,) * len(joints))
     firsts = np.searchsorted(observations.owner, np.arange(runs + 1))
-    return variation_between(observations, joints, value, firsts, taken=taken)
+    found = variation_between(observations, joints, value, firsts, taken=taken)
+    if not any(item is not None and item.std[DELAY] > 0.0 for item in found.joints):
+        return found
+    return replace(found, delays=_shared(observations, joints, value, firsts, found))
 
 
 def variation_between(
@@ -99,6 +108,41 @@ def variation_between(
     reaches = [np.inf if band is None else 1.0 / (2.0 * np.pi * band) for band in observations.data.bands]
     pairs = zip(found, reaches, strict=True)
     return RunVariation(tuple(None if item is None else replace(item, reach=reach) for item, reach in pairs))
+
+
+def _shared(
+    observations: Observations, joints: Sequence[JointRows], value: Array, firsts: NDArray[np.intp], found: RunVariation
+) -> SharedDelays | None:
+    """Return the delays of runs that joints tell together, beside what else runs differ by, free reversals and viscous friction."""
+    if not observations.raw or any(rows.sizes is not None for rows in joints):
+        return None
+    late_reversals = observations.late_reversals(value[: observations.parameters])
+
+    def of_joint(joint: int, rows: JointRows) -> _Sums | None:
+        # Joints of added rows have those of the model first.
+        viscous = np.sum(rows.table[: len(observations.joints[joint].columns)][observations.of_speed(joint, 1)], axis=0)
+        directions = np.vstack([directions_of(observations, joint, rows, value), late_reversals[joint], viscous])
+        return _sums(directions, rows.left(value), rows.starts, firsts)
+
+    pairs = zip(side_by_side(of_joint, range(len(joints)), joints), found.joints, strict=True)
+    told = [(own, item) for own, item in pairs if own is not None and own.back[DELAY] > 0.0]
+    if not told:
+        return None
+    kinds = len(KINDS)
+    priors = np.zeros((len(told), kinds + FREE))
+    for place, (own, item) in enumerate(told):
+        if item is not None:
+            priors[place, :kinds] = (item.std / np.where(own.back[:kinds] > 0.0, own.back[:kinds], np.inf)) ** 2
+        priors[place, kinds:] = np.where(own.back[kinds:] > 0.0, np.inf, 0.0)
+    rms = np.array([np.sqrt(np.mean(own.directions**2, axis=1)) for own, _ in told])
+    return shared_delays(
+        np.array([own.products for own, _ in told]),
+        np.array([own.aims for own, _ in told]),
+        priors,
+        np.array([own.back[DELAY] for own, _ in told]),
+        DELAY,
+        rms[:, DELAY] / np.maximum(rms[:, SCALE], np.finfo(float).tiny),
+    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,6 +10,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from scara_ident.diagnosis.diagnose import diagnose
+from scara_ident.effects.presliding import dahl_state
 from scara_ident.estimation import Estimate, wls
 from scara_ident.estimation.run_offsets import beside_offsets
 from scara_ident.estimation.run_variation import KINDS, JointVariation, RunVariation
@@ -59,8 +60,16 @@ def test_how_far_runs_differ_is_found():
         found += [item.std for item in estimate.variation.joints if item is not None]
         # What a model lacks of a joint differs from motion to motion, too.
         plain, doubted = (estimate.variation.sentences(ROBOT, joint) for joint in (None, "joint1"))
-        assert all(said.startswith(f"joint{j} differs from run to run") for j, said in enumerate(plain, 1))
-        assert doubted == [plain[0] + "; what is unexplained may make it seem so", plain[1]]
+        *each, late = plain
+        assert all(said.startswith(f"joint{j} differs from run to run") for j, said in enumerate(each, 1))
+        assert late.startswith(
+            "effort comes late by another time in each run, on all joints alike (standard deviation "
+        )
+        assert doubted == [each[0] + "; what is unexplained may make it seem so", each[1], late]
+        # The runs' delays are about zero, so that their spread is their size.
+        assert [joint["delay"] for joint in estimate.variation.sizes(ROBOT).values()] == [
+            np.std(item.of_run[:, 3], ddof=1) for item in estimate.variation.joints if item is not None
+        ]
     assert len(found) == 8
     assert_allclose(np.sqrt(np.mean(np.square(found), axis=0)), DIFFERENT, rtol=0.35)
 
@@ -133,6 +142,29 @@ def test_what_differs_by_more_than_itself_is_given_no_share():
     item = JointVariation(np.ones((4, 6)), std, np.zeros((3, 4)), 0.01, np.array([0, 2, 4, 6]), np.zeros((3, 4)))
     said = RunVariation((item, None)).sentences(ROBOT)
     assert said == ["joint1 differs from run to run (standard deviation): its friction by more than all of it"]
+
+
+@pytest.mark.parametrize("lacking", ["late alone", "building up"])
+def test_what_one_joint_shows_alone_is_not_called_a_delay(lacking: str):
+    """`joint1 differs from run to run (standard deviation): its delay by 1.5 ms`, of arms without any."""
+    made = []
+    for k, run in enumerate(runs(np.random.default_rng(4), (0.0,) * 4, count=6, seconds=6.0)):
+        if lacking == "late alone":
+            changed = np.interp(run.time - 0.004 * k, run.time, run.effort[0])
+        else:
+            # Coulomb friction that builds up over another distance in each run.
+            jump = np.sign(np.gradient(run.position[0]))
+            changed = run.effort[0] + FRICTION[0][0] * (dahl_state(run.position[0], 0.01 * (1 + k)) - jump)
+        made.append(replace(run, effort=np.array([changed, run.effort[1]])))
+    variation = wls(observed(made)).variation
+    assert variation is not None
+    said = variation.sentences(ROBOT)
+    assert not any("its delay" in item or "comes late" in item for item in said)
+    assert any(
+        item.startswith("joint1") and "looks like a delay, which the joints do not share" in item for item in said
+    )
+    assert "delay" not in variation.sizes(ROBOT)["joint1"]
+    assert variation.sizes(ROBOT)["joint1"]["like a delay"] > 5e-4
 
 
 def test_of_two_runs_no_more_is_said_than_their_offsets():

@@ -35,7 +35,7 @@ def test_the_story_has_both_tables_and_the_candidates_that_chance_does_not_expla
 
 def test_what_is_tentative_what_is_noise_and_how_runs_differ_stand_in_the_story(result):
     guess = TentativeEffect("stribeck", "joint1", "d", "helps in only 1 of 2", "slow motion", 0.0712, 3e-4)
-    variation = RunVariation((JointVariation(np.ones((4, 4)), np.array([0.06, 0.0, 0.0, 0.003]), np.zeros((2, 4)), 0.01, np.array([0, 2, 4]), np.zeros((2, 4))), None))  # fmt: skip
+    variation = RunVariation((JointVariation(np.ones((4, 4)), np.array([0.06, 0.0, 0.0, 0.003]), np.array([[0.0] * 3 + [late] for late in (-0.003, 0.0, 0.003)]), 0.01, np.array([0, 1, 2, 4]), np.zeros((3, 4))), None))  # fmt: skip
     changed = replace(result, tentative=(guess,), after=replace(result.after, variation=variation))
     content, text = diagnosis_dict(changed), diagnosis_markdown(changed)
     assert content["run_variation"] == {"joint1": {"friction": 0.06, "delay": 0.003}}

@@ -62,6 +62,10 @@ class Friction(Filled):
         """Each joint's friction acts on that joint only."""
         return np.repeat(np.eye(self.robot.n, dtype=bool), len(self.powers), axis=1)
 
+    def of_power(self, power: int) -> NDArray[np.bool_]:
+        """Return which columns are of a power of speed, shape (k,)."""
+        return np.tile(np.array(self.powers) == power, self.robot.n)
+
     def constraints(self) -> tuple[Constraint, ...]:
         """Return that every joint's friction brakes and leaves the motor able to reach the velocity limit."""
         k = len(self.powers)

@@ -197,7 +197,7 @@ def variation_blocks(robot: Robot, variation: RunVariation | None, runs: Sequenc
     each: list[list[Cell | str]] = []
     for joint, k, item in shown:
         found = [_sized(float(off), unit_of_kind(robot, joint, KINDS[k])) for off in item.of_run[:, k]]
-        each.append([name(joint), Cell(KINDS[k], "unit"), *(value for value, _ in found), found[0][1]])
+        each.append([name(joint), Cell(variation.kinds[k], "unit"), *(value for value, _ in found), found[0][1]])
     head = ["joint", "what differs", *runs, "unit"]
     words = (
         "Standard deviation between runs, beyond what noise makes of them; it is in the standard deviations of all parameters. "
