@@ -161,15 +161,15 @@ def test_what_friction_hides_of_the_beginning_is_taken_for_no_swing():
     free, true = free_swings(swing, count), np.array([0.001, -0.002, 0.05, 0.08])
     torque = -times(swing.inertia, free[2])
     fade, size = np.ones((2, count)), (np.full((2, count), 0.02), np.full((2, count), 0.6))
-    fade[:, 400:440] = fade[:, :20] = 0.0
+    fade[:, 60:100] = fade[:, :20] = 0.0
     left = np.tensordot(true, torque, 1)
-    left[:, 400:440] += 5.0
+    left[:, 60:100] += 5.0
     left[:, :20] -= 5.0
     known, unknown = (
         InitialState(free, torque, np.ones(2), each, rate, 30.0, slice(20, count - 20)) for each in (fade, fade**0.0)
     )
     # The ridge holds back a little of what is seen least.
-    assert known.state(left, size) == pytest.approx(true, rel=0.03)
+    assert known.state(left, size) == pytest.approx(true, rel=0.06)
     assert np.max(np.abs(unknown.state(left, size) / true - 1.0)) > 0.5
     # Where all that would show it is faded out it stays as assumed.
     fade[:] = 0.0
