@@ -323,6 +323,10 @@ class Effect(ABC):
         """
         return ()
 
+    def elsewhere(self, scene: Scene, member: Member) -> tuple[Member, ...]:
+        """Return members of the same joint from which a fit of several that act together may end in another minimum."""
+        return ()
+
     def essential(self, scene: Scene, member: Member) -> slice:
         """Return the coefficients of which one at least is not zero where the effect is there: all, unless one says it."""
         return slice(None)

@@ -148,6 +148,11 @@ class JointElasticity(BehindGear):
                 pairs.append((Member(member.place, both), Member(j, both)))
         return tuple(pairs)
 
+    def elsewhere(self, scene: Scene, member: Member) -> tuple[Member, ...]:
+        """Return a softer and a stiffer gear, as far as the frequencies that are tried are apart."""
+        reached = (member.nonlinear[0] / SPACING, member.nonlinear[0] * SPACING)
+        return tuple(Member(member.place, (x, DAMPING)) for x in reached if LOWEST_FREQUENCY < x < HIGHEST_FREQUENCY)
+
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """Say so where a spring does not pull back, would swing slower than is seen, or does not swing at all."""
         wrong = super().inadmissible(scene, member, value, std)
