@@ -121,7 +121,7 @@ class PreparedStretch:
     @made_once
     def rest(self) -> NDArray[np.bool_]:
         """Where each joint stands still, shape (n, N), widened by the memory of the position's filter, or is left out."""
-        return (self._moving == 0.0) | self.left_out
+        return np.asarray((self._moving == 0.0) | self.left_out)
 
     @made_once
     def fade(self) -> Array:

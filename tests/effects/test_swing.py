@@ -163,8 +163,8 @@ def test_what_friction_hides_of_the_beginning_is_taken_for_no_swing():
     fade, size = np.ones((2, count)), (np.full((2, count), 0.02), np.full((2, count), 0.6))
     fade[:, 60:100] = fade[:, :20] = 0.0
     left = np.tensordot(true, torque, 1)
-    left[:, 60:100] += 5.0
-    left[:, :20] -= 5.0
+    left[:, 60:100] += 20.0
+    left[:, :20] -= 20.0
     known, unknown = (
         InitialState(free, torque, np.ones(2), each, rate, 30.0, slice(20, count - 20)) for each in (fade, fade**0.0)
     )
