@@ -89,6 +89,8 @@ class Conditions:
         Whether files are numbered through instead of named by motion and repetition.
     variation : Variation
     runs : tuple of Run
+    scatter : float
+        Standard deviation of recorded positions beside the encoder's steps, in steps; not of what the controller reads.
     """
 
     rate: float
@@ -102,6 +104,7 @@ class Conditions:
     numbered: bool
     variation: Variation
     runs: tuple[Run, ...]
+    scatter: float = 0.0
 
     @property
     def ticks(self) -> int:
@@ -120,7 +123,7 @@ class Conditions:
 
 @dataclass(frozen=True)
 class Asked:
-    """Conditions that are asked for instead of drawn; None is drawn. Events are there only where they are asked for."""
+    """Conditions that are asked for instead of drawn; None is drawn. Events and scatter are there only where they are asked for."""
 
     rate: float | None = None
     bits: int | None = None
@@ -134,6 +137,7 @@ class Asked:
     duration: tuple[float, float] | None = None
     varied: bool | None = None
     events: bool = False
+    scatter: float = 0.0
 
 
 def draw_conditions(rng: np.random.Generator, asked: Asked) -> Conditions:
@@ -165,6 +169,7 @@ def draw_conditions(rng: np.random.Generator, asked: Asked) -> Conditions:
         numbered=numbered,
         variation=variation,
         runs=_draw_runs(rng, asked, variation.days),
+        scatter=asked.scatter,
     )
 
 

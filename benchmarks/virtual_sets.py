@@ -308,9 +308,20 @@ def _recorded(
         refuse_shaking(motion, result.true.acceleration)
         name = f"run_{k + 1:02d}" if conditions.numbered else result.recording.name
         trajectory, repetition = split_name(name)
-        recordings.append(replace(result.recording, name=name, trajectory=trajectory, repetition=repetition))
+        position = scattered(result.recording.position, arm.encoder_resolution, conditions.scatter, (seed, k))
+        recordings.append(
+            replace(result.recording, name=name, trajectory=trajectory, repetition=repetition, position=position)
+        )
         events += [event_truth(arm, event, result, name) for event in own]
     return recordings, events
+
+
+def scattered(
+    position: NDArray[np.float64], resolution: NDArray[np.float64], scatter: float, seed: Sequence[int]
+) -> NDArray[np.float64]:
+    """Return positions, shape (n, N), that are off by whole steps of their encoders, with a standard deviation of so many."""
+    steps = np.rint(scatter * np.random.default_rng(seed).standard_normal(position.shape))
+    return position + resolution[:, None] * steps
 
 
 def usual_torque(arm: VirtualArm, motions: Sequence[ReferenceMotion]) -> NDArray[np.float64]:
@@ -349,6 +360,7 @@ def add_conditions(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--motions", type=int, help="number of different ones among them")
     parser.add_argument("--duration", type=float, nargs=2, help="s, least and most")
     parser.add_argument("--varied", action=argparse.BooleanOptionalAction, help="whether runs differ")
+    parser.add_argument("--scatter", type=float, default=0.0, help="noise of positions beside the steps, in steps")
     parser.add_argument("--events", action="store_true", help="pushes and a payload in some recordings")
 
 

@@ -163,3 +163,18 @@ def test_an_arm_that_its_controller_shakes_gets_a_slower_one(sets: ModuleType) -
     assert recorded == "recorded"
     assert tried == pytest.approx([arm.controller.derivative[0] * sets.SLOWER**k for k in range(3)])
     assert held.controller.derivative[0] == tried[-1]
+
+
+def test_positions_scatter_by_whole_steps_where_that_is_asked_for(sets: ModuleType, tmp_path: Path) -> None:
+    plain, noisy = (
+        sets.simulate_set("none", 21, "scara03", tmp_path, small(sets, bits=16, scatter=scatter))
+        for scatter in (0.0, 1.5)
+    )
+    resolution = plain.arm.encoder_resolution[:, None]
+    for one, other in zip(plain.training, noisy.training, strict=True):
+        np.testing.assert_array_equal(one.effort, other.effort)
+        steps = (other.position - one.position) / resolution
+        np.testing.assert_allclose(steps, np.rint(steps), atol=1e-3)
+        # Rounding adds a twelfth.
+        assert np.std(np.rint(steps)) == pytest.approx(np.sqrt(1.5**2 + 1.0 / 12.0), rel=0.05)
+    assert noisy.truth()["conditions"]["scatter"] == 1.5

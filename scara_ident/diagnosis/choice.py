@@ -161,6 +161,9 @@ def _each_fitted(
     found = []
     for begun, candidate in begins.values():
         own, decision = fitted_with(begun, candidate, coarse=True)
+        if candidate.effect.together and own.scene.together and not _if_more(step, decision).accepted:
+            # Beside others that it acts with a coarse fit ends early: what they took up of it goes back to it slowly.
+            own, decision = fitted_with(own, decision.candidate)
         found.append((own, _if_more(step, decision)))
     return found
 

@@ -143,10 +143,12 @@ def _of_joint(
     small, of_positions, of_effects = allowed
     repeats = fit is not None and fit.p_value < criteria.significant
     if limit > criteria.least_power:
-        effect = (
-            "no effect" if limit >= 1.0 else f"no effect that removes less than {limit:.0%} of the squared residual"
+        missing = (
+            "nothing missing"
+            if limit >= 1.0
+            else f"nothing missing that makes less than {limit:.0%} of the squared residual"
         )
-        why = f"{effect} would have been significant: record more"
+        why = f"{missing} would have been significant: record more"
         return Evidence(joint, False, "", why, limit)
     if fit is not None and repeats and fit.missing > small:
         why = f"{_beside(fit, unit)}: more than filters and encoders alone leave, but too little to tell what it is"

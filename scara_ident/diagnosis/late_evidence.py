@@ -11,7 +11,7 @@ from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
 from scara_ident.diagnosis.evidence import Evidence
 from scara_ident.estimation import Estimate
 from scara_ident.estimation.observations import Observations
-from scara_ident.estimation.run_variation import KINDS, late_alike
+from scara_ident.estimation.run_variation import KINDS, late_alike, late_words
 
 
 def late_evidence(
@@ -41,8 +41,7 @@ def late_evidence(
             made = float(np.sum((late * own.directions[KINDS.index("delay")]) ** 2))
             rest = float(np.sum((rows.left(after.value) - own.off) ** 2))
             if made > criteria.least_gain * (made + rest):
-                word = "lags" if late > 0.0 else "leads"
-                why = f"it {word} by {1e3 * abs(late):.2g} ms in all runs alike, and no effect stands for that"
+                why = f"it {late_words(own, late)} in all runs alike, and no effect stands for that"
                 item = replace(item, shown=False, by="", why=why)
         found.append(item)
     return tuple(found)

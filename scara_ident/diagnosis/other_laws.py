@@ -1,15 +1,14 @@
-"""What the parameters of an effect owe to the law that it is fitted by: another may explain as much with others."""
+"""What the parameters of an effect owe to the fit that they are of: another law or minimum may explain as much with others."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
 
-import numpy as np
-
 from scara_ident.diagnosis.effect_parameters import PhysicalParameters, physical_parameters
 from scara_ident.diagnosis.exchange import same
 from scara_ident.diagnosis.nonlinear_fit import tune
+from scara_ident.diagnosis.other_minima import as_good, widened
 from scara_ident.diagnosis.selection_step import SelectionStep
 
 
@@ -17,19 +16,20 @@ def parameters_of_laws(step: SelectionStep) -> PhysicalParameters:
     """Return the physical parameters of all chosen effects, as uncertain as it is by which law they are.
 
     Where another law of an effect explains as much, its parameters by that one are as good: what they differ by is one
-    more standard deviation. An effect by another law than that of its name has what tells the law among its parameters.
+    more standard deviation. So it is with other fits of effects that act together, see `as_good`. An effect by another law than
+    that of its name has what tells the law among its parameters.
     """
     own = physical_parameters(step)
     effects = list(own.effects)
     for place, item in enumerate(step.chosen):
         effects[place] = {**effects[place], **item.effect.law()}
         for other in _as_good(step, place):
-            told = physical_parameters(other).effects[place]
-            effects[place] |= {
-                name: replace(one, std=float(np.hypot(one.std, told[name].value - one.value)))
-                for name, one in effects[place].items()
-                if name in told
-            }
+            effects[place] = widened(effects[place], physical_parameters(other).effects[place])
+    for other in as_good(step):
+        told = physical_parameters(other).effects
+        for place, item in enumerate(step.chosen):
+            if item.effect.together:
+                effects[place] = widened(effects[place], told[place])
     return replace(own, effects=tuple(effects))
 
 

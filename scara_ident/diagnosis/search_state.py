@@ -12,6 +12,7 @@ from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.correction import Correction, taken_out
 from scara_ident.diagnosis.interval_fit import refined
 from scara_ident.diagnosis.nonlinear_fit import tune
+from scara_ident.diagnosis.other_minima import lowest
 from scara_ident.diagnosis.selection_step import SelectionStep, moved_together, observed
 from scara_ident.effects import Scene
 from scara_ident.estimation.least_squares import value_and_weights
@@ -133,7 +134,8 @@ class SearchState:
             state = replace(state, step=replace(state.step, chosen=(*state.step.chosen, candidate)))
         if not candidate.corrects_data or candidate.effect.settled(winner.examination.value):
             state = state.only({winner.label})
-        step = refined(tune(state.step))
+        # What came in and acts with others may have begun nearer to another minimum.
+        step = refined(lowest(state.step) if candidate.effect.together else tune(state.step))
         fitted = observed(step)
         value, weights = value_and_weights(fitted, step.offsets)
         step = replace(step, scene=at_estimate(step.scene, step.chosen, value), weights=weights)

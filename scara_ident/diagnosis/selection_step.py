@@ -21,6 +21,7 @@ from scara_ident.estimation.joint_rows import JointRows
 from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.run_offsets import offsets_on
 from scara_ident.estimation.run_variation import RunVariation
+from scara_ident.estimation.sample_columns import SampleColumns
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.prepared import PreparedData
 
@@ -250,7 +251,9 @@ def model_with(scene: Scene, chosen: Sequence[Candidate]) -> TorqueModel:
 def observed(step: SelectionStep) -> Observations:
     """Return the rows of the base model with the chosen effects."""
     joints = with_columns(step.observations, step.columns.rows(step.scene, step.chosen))
-    return replace(step.observations, model=model_with(step.scene, step.chosen), joints=joints, raw=())
+    return replace(
+        step.observations, model=model_with(step.scene, step.chosen), joints=joints, raw=step.observations.raw.of(())
+    )
 
 
 def observed_at_every_sample(step: SelectionStep) -> Observations:
@@ -272,7 +275,8 @@ def observed_at_every_sample(step: SelectionStep) -> Observations:
             )
             place += 1
         raws.append(tuple(found))
-    return replace(observed(step), raw=tuple(raws))
+    rows = observed(step)
+    return replace(rows, raw=SampleColumns(rows.model, rows.data.recordings, tuple(raws)))
 
 
 def moments_of(data: PreparedData) -> NDArray[np.intp]:

@@ -326,6 +326,14 @@ class Effect(ABC):
         """
         return ()
 
+    def elsewhere(self, scene: Scene, member: Member) -> tuple[Member, ...]:
+        """Return members of the same joint from which a fit of several that act together may end in another minimum."""
+        return ()
+
+    def unfound(self, scene: Scene, member: Member) -> tuple[Member, ...]:
+        """Return members of other joints that may be there too, and of which this one takes up what is too small to be found."""
+        return ()
+
     def essential(self, scene: Scene, member: Member) -> slice:
         """Return the coefficients of which one at least is not zero where the effect is there: all, unless one says it."""
         return slice(None)

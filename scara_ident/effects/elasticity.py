@@ -136,17 +136,29 @@ class JointElasticity(BehindGear):
     def instead(self, scene: Scene, member: Member) -> tuple[tuple[Member, Member], ...]:
         """Return gears of two links that share much of their inertia: one softer gear swings as slowly as both together."""
         frequency, ratio = member.nonlinear
-        taken = {item.place for effect, item in scene.together if effect == self}
-        found = {
-            j: usual_coupling(scene, member.place, j) for j in self.joints(scene) if j not in {member.place, *taken}
-        }
         pairs = []
-        for j in sorted((j for j in found if found[j] > LEAST_COUPLING), key=lambda j: -found[j]):
+        for j, coupling in self._coupled(scene, member).items():
             # Of two alike, the slower way to swing together.
-            both = frequency * np.sqrt(1.0 + min(found[j], 1.0)), max(ratio, STEADY_DAMPING)
+            both = frequency * np.sqrt(1.0 + min(coupling, 1.0)), max(ratio, STEADY_DAMPING)
             if both[0] < HIGHEST_FREQUENCY:
                 pairs.append((Member(member.place, both), Member(j, both)))
         return tuple(pairs)
+
+    def unfound(self, scene: Scene, member: Member) -> tuple[Member, ...]:
+        """Return the gear of the link that shares most of its inertia, so stiff that it swings faster than is seen."""
+        frequency = min(SPACING * max(scene.band, member.nonlinear[0]), HIGHEST_FREQUENCY)
+        return tuple(Member(j, (frequency, DAMPING)) for j in self._coupled(scene, member))[:1]
+
+    def _coupled(self, scene: Scene, member: Member) -> dict[int, float]:
+        """Return joints without an elastic gear in the model whose links share much of their inertia, most of it first, and how much."""
+        taken = {member.place, *(item.place for effect, item in scene.together if effect == self)}
+        found = {j: usual_coupling(scene, member.place, j) for j in self.joints(scene) if j not in taken}
+        return {j: found[j] for j in sorted(found, key=lambda j: -found[j]) if found[j] > LEAST_COUPLING}
+
+    def elsewhere(self, scene: Scene, member: Member) -> tuple[Member, ...]:
+        """Return a softer and a stiffer gear, as far as the frequencies that are tried are apart."""
+        reached = (member.nonlinear[0] / SPACING, member.nonlinear[0] * SPACING)
+        return tuple(Member(member.place, (x, DAMPING)) for x in reached if LOWEST_FREQUENCY < x < HIGHEST_FREQUENCY)
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """Say so where a spring does not pull back, would swing slower than is seen, or does not swing at all."""

@@ -202,19 +202,9 @@ def rigid_slopes(signals: Signals, joint: int) -> tuple[Array, Array, Array]:
         return _traced_slopes(signals, joint)
     held = _SLOPES.setdefault(motion.kinematics, {})
     if joint not in held or held[joint][0] is not scene.value:
-        state = (motion.q, motion.v, motion.a)
-        steps = (POSITION_STEP, SPEED_STEP * max(float(np.max(np.abs(motion.v))), 1.0))
-        found = []
-        for k, step in enumerate(steps):
-            up, down = [part.copy() for part in state], [part.copy() for part in state]
-            up[k][joint] += step
-            down[k][joint] -= step
-            found.append((rigid_torque(scene, motion, *up) - rigid_torque(scene, motion, *down)) / (2.0 * step))
-        # Torque is linear in acceleration.
-        pushed = motion.a.copy()
-        pushed[joint] += 1.0
-        by_a = rigid_torque(scene, motion, motion.q, motion.v, pushed) - signals.rigid
-        held[joint] = scene.value, (found[0], found[1], by_a)
+        term = scene.model.rigid_body
+        by_q, by_v, by_a = term.slopes(motion, scene.value[scene.model.place(term)], joint)
+        held[joint] = scene.value, (by_q, by_v, by_a)
     return held[joint][1]
 
 

@@ -212,7 +212,7 @@ class PayloadOfRecordings(Effect):
         if self._told(scene.robot)[0] != 0:
             return None
         if value[0] < -SEEN_STDS * std[0]:
-            return "its mass would be negative: these recordings carry less than the others"
+            return "its mass would be negative: these recordings carry less than the others, or differ by no body"
         return _too_heavy(scene, float(value[0]), float(std[0]))
 
     def essential(self, scene: Scene, member: Member) -> slice:

@@ -50,7 +50,7 @@ def gear_stiffness(
     -------
     Parameter or None
         The standard deviation by blocks of time, and by what of the lag no torque made, which makes a gear look stiffer or
-        softer. None where no lag is seen.
+        softer: of what is left all that is not white. None where no lag is seen.
     """
     columns, torque, blocks, noise = [], [], [], 0.0
     runs = [item for item in recordings if item.recording.link_position is not None]
@@ -94,13 +94,22 @@ def gear_stiffness(
     alone = 1.0 / (float(np.sum(inverse[0] ** 2)) * len(right))
     share = noise**2 / (alone * scale[0] ** 2)
     stiffness = float(value[0] / scale[0])
-    passed = right - table[:-1, 1:] @ value[1:]
-    alike = float(np.corrcoef(passed, table[:-1, 0])[0, 1])
+    # Of what the other columns do not span: zeros and speed are most of any lag.
+    both = np.stack([table[:-1, 0], right])
+    beside = table[:-1, 1:]
+    own_lag, passed = both - np.linalg.lstsq(beside, both.T, rcond=None)[0].T @ beside.T
+    made = value[0] * own_lag
+    left = passed - made
+    # What is left and is not white, as the noise of a torque is, may be the lag's.
+    near = owner[1:] == owner[:-1]
+    white = 0.5 * float(np.mean((left[1:] - left[:-1])[near] ** 2)) if np.any(near) else 0.0
+    slow = max(0.0, float(np.mean(left**2)) - white)
+    alike = float(np.mean(made**2)) / (float(np.mean(made**2)) + slow)
     # What of the lag no torque made, be it noise or an encoder's error that repeats, makes a gear look softer by no more than
     # the torque leaves of the lag: regressed the other way round, on the torque, the stiffness is so much larger.
-    softer = max(share, 1.0 / max(alike**2, LEAST_ALIKE) - 1.0)
+    softer = max(share, 1.0 / max(alike, LEAST_ALIKE) - 1.0)
     std = float(np.hypot(np.sqrt(squares) / scale[0], softer * stiffness))
-    if share > MOST_NOISE or not alike**2 > LEAST_ALIKE or not stiffness > LEAST_STDS * std:
+    if share > MOST_NOISE or not alike > LEAST_ALIKE or not stiffness > LEAST_STDS * std:
         return None
     return Parameter(stiffness, std, "N/m" if scene.robot.prismatic[joint] else "N m/rad")
 

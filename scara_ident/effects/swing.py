@@ -154,6 +154,8 @@ class InitialState:
         What they add to the torques of the joints.
     weights : ndarray, shape (m,)
         Of the rows of each joint's torque.
+    fade : ndarray, shape (m, M)
+        Weight of every sample of each joint's torque, 0 where friction is unknown, which would be taken for a swing.
     rate, band : float
         Hz; the torque is looked at within the band.
     used : slice
@@ -163,6 +165,7 @@ class InitialState:
     free: Lag
     torque: Array
     weights: Array
+    fade: Array
     rate: float
     band: float
     used: slice
@@ -174,7 +177,12 @@ class InitialState:
 
     @cached_property
     def _seen(self) -> Array:
-        return self._rows(self.torque)
+        return self._rows(self.fade * self.torque)
+
+    @cached_property
+    def _strength(self) -> Array:
+        """Square of what each unit would show were nothing faded out, shape (2 m,)."""
+        return np.asarray(np.sum(self._rows(self.torque) ** 2, axis=1))
 
     def _rows(self, torque: Array) -> Array:
         """Return what is seen of torques (..., m, N), shape (..., rows)."""
@@ -195,11 +203,11 @@ class InitialState:
         -------
         ndarray, shape (..., 2 m)
         """
-        left = self._rows(torque)
+        left = self._rows(self.fade * torque[..., : self.count])
         sizes = np.mean(np.concatenate(lag) ** 2, axis=1)
         normal = self._seen @ self._seen.T
         # What cannot be seen stays as assumed.
-        normal += np.diag(UNSEEN * np.trace(normal * sizes) / sizes)
+        normal += np.diag(UNSEEN * (self._strength @ sizes) / sizes)
         told = np.linalg.inv(normal)
         # Once more on what that leaves: of what is seen a thousandth would stay as assumed, for as long as it swings.
         once = left @ self._seen.T @ told

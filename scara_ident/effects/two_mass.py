@@ -180,8 +180,9 @@ class TwoMasses:
         free = free_swings(self.swing, count)
         size = np.std(motion.torque[self.joints], axis=1)
         weights = np.where(size > 0.0, 1.0 / np.where(size > 0.0, size, 1.0), 0.0) if len(size) > 1 else np.ones(1)
+        fade = np.ones((len(size), count)) if motion.fade is None else motion.fade[self.joints, :count]
         used = slice(trim, min(count, motion.samples - trim))
-        return InitialState(free, self._on_own(free), weights, motion.rate, band, used)
+        return InitialState(free, self._on_own(free), weights, fade, motion.rate, band, used)
 
     @property
     def change(self) -> Array:

@@ -14,10 +14,11 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.estimation.information import weighted
+from scara_ident.estimation.information import Information, merge, weighted
 from scara_ident.estimation.observations import Observations, informations
+from scara_ident.estimation.sample_columns import few_enough
 from scara_ident.manners import listed
-from scara_ident.motion.position_noise import NoiseSizes, noise_sizes, noisier
+from scara_ident.motion.position_noise import NoiseSizes, forget_stepless, noise_sizes, noisier
 from scara_ident.motion.prepared import PreparedData, PreparedRecording
 from scara_ident.threads import side_by_side
 
@@ -45,11 +46,30 @@ def noise_bias(observations: Observations, weights: Array, value: Array | None) 
     here = observations.in_memory
     # The bias follows from the motion: a repetition has the same, and adds to what is known of it chance alone.
     places = [here.data.labels.index(label) for label in dict.fromkeys(here.data.labels)]
-    again = informations(here.model, noisier(here.data).of(places))
+    again = _drawn_again(here, places)
     # What is compared is of the same samples.
     same = here is observations and len(places) == len(here.data.recordings)
     once = value if same and value is not None else weighted(here.of(places).by_joint, weights).solve().value
     return np.asarray(weighted(again, weights).solve().value - once)
+
+
+def _drawn_again(observations: Observations, places: Sequence[int]) -> tuple[Information, ...]:
+    """Return the rows of every joint of some recordings with the noise once more, of more than are held group by group."""
+    model, data = observations.model, observations.data
+    if few_enough(data):
+        return informations(model, noisier(data).of(places))
+    groups: list[list[int]] = []
+    for place in places:
+        if groups and few_enough(data.of([*groups[-1], place])):
+            groups[-1].append(place)
+        else:
+            groups.append([place])
+    drawn = []
+    for seed, group in enumerate(groups):
+        some = data.of(group)
+        drawn.append(informations(model, noisier(some, seed)))
+        forget_stepless(some)
+    return tuple(merge(parts) for parts in zip(*drawn, strict=True))
 
 
 def noise_torque(observations: Observations, value: Array) -> Array:

@@ -20,15 +20,13 @@ from scara_ident.errors import RecordingError
 from scara_ident.estimation.information import Information, merge
 from scara_ident.estimation.joint_rows import JointRows, joined
 from scara_ident.estimation.residuals import Residuals
+from scara_ident.estimation.sample_columns import Raw, SampleColumns, few_enough
 from scara_ident.manners import Frozen
 from scara_ident.model.model import TorqueModel
 from scara_ident.model.terms.friction import Friction
 from scara_ident.motion.position_noise import coarse_positions
 from scara_ident.motion.prepared import PreparedData, PreparedRecording, PreparedStretch
 from scara_ident.threads import THREADS, side_by_side
-
-# Columns of every joint at every sample of a stretch, (k, N) each.
-Raw = tuple[Array, ...]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -42,7 +40,7 @@ class Observations(Frozen):
     joints : tuple of JointRows
     owner : ndarray of int, shape (blocks,)
         Recording of each block.
-    raw : tuple of tuple of tuple of ndarray, each of shape (k, N)
+    raw : SampleColumns
         For every recording, stretch and joint the columns at every sample, not filtered.
     kept : Observations or None
         Those whose rows are of the samples in `data` alone, where the rows hold all of longer files; None where they hold no more.
@@ -54,7 +52,7 @@ class Observations(Frozen):
     data: PreparedData
     joints: tuple[JointRows, ...]
     owner: NDArray[np.intp]
-    raw: tuple[tuple[Raw, ...], ...]
+    raw: SampleColumns
     kept: Observations | None = None
     counts: tuple[int, ...] | None = None
 
@@ -89,14 +87,14 @@ class Observations(Frozen):
             data=self.data.of(places),
             joints=tuple(joint.part(blocks) for joint in self.joints),
             owner=owner.astype(np.intp),
-            raw=tuple(self.raw[k] for k in places),
+            raw=self.raw.of(places),
             kept=None if self.kept is None else self.kept.of(places),
             counts=None if self.counts is None else tuple(self.counts[k] for k in places),
         )
         if "_predicted" in self.__dict__:
             value, torque = self.__dict__["_predicted"]
             parts = iter(torque)
-            by_recording = [[next(parts) for _ in recording] for recording in self.raw]
+            by_recording = [[next(parts) for _ in item.stretches] for item in self.data.recordings]
             found.__dict__["_predicted"] = value, tuple(chain.from_iterable(by_recording[k] for k in places))
         return found
 
@@ -180,13 +178,18 @@ class Observations(Frozen):
         """
         columns = [joint.columns for joint in self.joints]
 
-        def of_stretch(raw: Raw) -> Array:
-            torque = np.array([value[own] @ row for own, row in zip(columns, raw, strict=True)])
-            torque.flags.writeable = False
-            return torque
+        def of_recording(place: int) -> list[Array]:
+            found = [
+                np.array([value[own] @ row for own, row in zip(columns, raw, strict=True)]) for raw in self.raw[place]
+            ]
+            for torque in found:
+                torque.flags.writeable = False
+            return found
 
         return self._of_last(
-            "_predicted", value, lambda: tuple(side_by_side(of_stretch, chain.from_iterable(self.raw)))
+            "_predicted",
+            value,
+            lambda: tuple(chain.from_iterable(side_by_side(of_recording, range(len(self.raw))))),
         )
 
     def late(self, value: Array) -> tuple[Array, ...]:
@@ -279,13 +282,17 @@ def observe(model: TorqueModel, data: PreparedData, known: Observations | None =
     if held:
         data = replace(data, recordings=tuple(items))
 
-    def of_recording(item: PreparedRecording) -> tuple[tuple[Raw, ...], Sequence[JointRows]]:
+    few = few_enough(data)
+
+    def of_recording(item: PreparedRecording) -> tuple[tuple[Raw, ...] | None, Sequence[JointRows]]:
         same = held.get(_key(item))
-        return _observed(model, item) if same is None else (same.raw[0], same.joints)
+        raw, rows = _observed(model, item) if same is None else (same.raw.held[0], same.joints)
+        return raw if few else None, rows
 
     parts = side_by_side(of_recording, data.recordings)
     joints, owner = joined([part for _, part in parts], model.active)
-    return Observations(model, data, joints, owner, tuple(raw for raw, _ in parts))
+    raw = SampleColumns(model, data.recordings, tuple(raw for raw, _ in parts))
+    return Observations(model, data, joints, owner, raw)
 
 
 def _key(item: PreparedRecording) -> tuple[int, ...]:

@@ -71,6 +71,8 @@ class JointVariation:
         Whether they are no estimates of these runs but what any are taken to differ by.
     draws : float
         How many independent offsets were seen: parameters take up the others, gravity where poses differ.
+    reach : float
+        Seconds, a radian of the fastest within the band: what follows the slope of the torque by more is no delay.
     """
 
     directions: Array
@@ -82,6 +84,7 @@ class JointVariation:
     memory: float = 1.0
     assumed: bool = False
     draws: float = 1.0
+    reach: float = np.inf
 
     @property
     def apart(self) -> Array:
@@ -161,13 +164,13 @@ class RunVariation:
             rms = np.sqrt(np.mean(item.directions**2, axis=1))
             late, least = late_alike(item), SPOKEN_OF * rms[SCALE]
             if shared is None and abs(late) * rms[DELAY] > least:
-                found.append(
-                    f"{joint} {'lags' if late > 0.0 else 'leads'} by {1e3 * abs(late):.2g} ms in all runs alike"
-                )
+                found.append(f"{joint} {late_words(item, late)} in all runs alike")
             units = ("{:.2g} %", "{:.2g} %", "{:.2g} " + robot.torque_unit(j), "{:.2g} ms")
             scales = (100, 100, 1, 1000)
             shown = [
-                f"{what} by {unit.format(std * scale)}"
+                "what follows the slope of its torque by more than any delay would"
+                if what == _DIFFERING[DELAY] and std > item.reach
+                else f"{what} by {'more than all of it' if scale == 100 and std > 1.0 else unit.format(std * scale)}"
                 for what, std, size, unit, scale in zip(_DIFFERING, item.apart, rms, units, scales, strict=True)
                 if std * size > least and not ((late or shared is not None) and what == _DIFFERING[DELAY])
             ]
@@ -318,6 +321,13 @@ def late_alike(item: JointVariation) -> float:
     late = item.of_run[:, DELAY]
     mean, apart = float(np.mean(late)), float(np.std(late, ddof=1))
     return mean if abs(mean) >= ALIKE * apart else 0.0
+
+
+def late_words(item: JointVariation, late: float) -> str:
+    """Return what the torque of a joint does that is late by so many seconds, in every run."""
+    if abs(late) > item.reach:
+        return "is left with what follows the slope of its torque by more than any delay would"
+    return f"{'lags' if late > 0.0 else 'leads'} by {1e3 * abs(late):.2g} ms"
 
 
 def unit_of_kind(robot: Robot, joint: str, kind: str) -> str:

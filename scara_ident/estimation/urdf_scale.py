@@ -188,7 +188,7 @@ def _compared(
     if scales is None:
         return f"{said}."
     if not scales:
-        return f"{said}; the URDF's masses do not show in these torques."
+        return f"{said}; whether the torques are those of the URDF's bodies, these recordings do not tell."
     # A scale that all joints share is one, whatever each of them bears.
     shared = _alike(scales.values()) and any(joint not in slight for joint in scales)
     little = {joint: scales[joint] for joint in slight if joint in scales and not 1.0 / USUAL < scales[joint] < USUAL}
@@ -214,7 +214,8 @@ def _compared(
         same = "those of the URDF" if spread == "1" else f"{spread} times the URDF's"
         return f"{said}. Torques of the bodies are {same}."
     asked = "are effort_gain and effort_side right?" if geared else "is effort_gain right?"
-    if _alike(scales.values()):
+    # Of few joints it is not known whether it is all that are scaled.
+    if _alike(scales.values()) and 2 * len(scales) > robot.n:
         return f"{said}. All inertial parameters are {middle:.2g} of the URDF's: {asked}"
     odd = ", ".join(
         f"{scale:.2g} times the URDF's on {joint}"

@@ -63,7 +63,9 @@ def run_variation(
         return RunVariation((None,) * len(joints))
     firsts = np.searchsorted(observations.owner, np.arange(runs + 1))
     found = variation_between(observations, joints, value, firsts, taken=taken)
-    return replace(found, delays=_shared(observations, joints, value, firsts, found)) if runs >= LEAST_RUNS else found
+    if not any(item is not None and item.std[DELAY] > 0.0 for item in found.joints):
+        return found
+    return replace(found, delays=_shared(observations, joints, value, firsts, found))
 
 
 def variation_between(
@@ -102,7 +104,10 @@ def variation_between(
     lost = np.ones(len(joints)) if taken is None else taken
     told = [(item, off) for item, off in zip(sums, lost, strict=True) if item is not None]
     estimated = iter(_estimated(*zip(*told, strict=True)) if told else ())
-    return RunVariation(tuple(None if item is None else next(estimated) for item in sums))
+    found = [None if item is None else next(estimated) for item in sums]
+    reaches = [np.inf if band is None else 1.0 / (2.0 * np.pi * band) for band in observations.data.bands]
+    pairs = zip(found, reaches, strict=True)
+    return RunVariation(tuple(None if item is None else replace(item, reach=reach) for item, reach in pairs))
 
 
 def _shared(

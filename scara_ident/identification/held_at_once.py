@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
+from scara_ident.estimation.sample_columns import MOST_VALUES, evenly
 from scara_ident.motion.prepared import PreparedData, PreparedRecording
-
-# Samples times joints that a diagnosis holds: it takes some 7 kB of each sample of a six-joint arm (benchmarks/many_logs.py).
-MOST_VALUES = 2_400_000
 
 
 def held_at_once(data: PreparedData, held_out: PreparedData) -> tuple[PreparedData, PreparedData, list[str]]:
@@ -38,6 +33,8 @@ def held_at_once(data: PreparedData, held_out: PreparedData) -> tuple[PreparedDa
             share = _samples(own) / sum(_size(part.recordings[k]) for k in _places(part, own))
             of_them = "" if share == 1.0 else f"{share:.0%} of the samples of "
             shown.append(f"{of_them}{len(own.recordings)} of {len(part.recordings)} recordings{words}")
+    if not shown:
+        return data, held_out, []
     note = (
         f"{count} samples of {len(data.bands)} joints are more than a diagnosis holds at once ({most:.0f}): it looks at "
         f"{' and '.join(shown)}, evenly over all; give the recordings that matter to choose others"
@@ -64,7 +61,7 @@ def _spread(data: PreparedData, most: float) -> PreparedData:
     motions = [[k for k, label in enumerate(data.labels) if label == own] for own in data.trajectories]
     for units in (motions, [[k] for k in range(len(sizes))]):
         for number in range(len(units), 0, -1):
-            chosen = sorted(k for place in _evenly(len(units), number) for k in units[place])
+            chosen = sorted(k for place in evenly(len(units), number) for k in units[place])
             # Two motions at least, or two repetitions, where there are any.
             if sum(sizes[k] for k in chosen) <= most and len(chosen) >= min(2, len(sizes)):
                 return data.of(chosen)
@@ -78,12 +75,8 @@ def _parts(data: PreparedData, most: float) -> PreparedData:
     for item in some.recordings:
         stretches, share = item.stretches, most * _size(item) / _samples(some)
         for number in range(len(stretches), 0, -1):
-            chosen = [stretches[k] for k in _evenly(len(stretches), number)]
+            chosen = [stretches[k] for k in evenly(len(stretches), number)]
             if sum(part.samples for part in chosen) <= share or number == 1:
                 cut.append(replace(item, stretches=tuple(chosen)))
                 break
     return replace(some, recordings=tuple(cut))
-
-
-def _evenly(count: int, number: int) -> Sequence[int]:
-    return [int(place) for place in np.floor((np.arange(number) + 0.5) * count / number)]

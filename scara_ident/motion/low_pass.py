@@ -24,6 +24,8 @@ MEMORY_PERIODS = 4.0
 HIGHEST = 8.0
 # Integral of its squared gain over frequency, in cut-offs: of 1 / (1 + x^8)^2 from 0 on.
 NOISE_WIDTH = 7.0 * np.pi / (64.0 * np.sin(np.pi / 8.0))
+# Of so many frequencies a mean over the filter's slope is that of all to a thousandth.
+FREQUENCIES = 2001
 # Signals that are transformed together: of more the memory leaves the cache, of fewer the calls take longer.
 ROWS_AT_ONCE = 8
 
@@ -53,6 +55,12 @@ def low_pass(signal: Array, rate: float, cut: float | None, step: int = 1) -> Ar
 def noise_share(rate: float, cut: float | None) -> float:
     """Return the share of the variance of white noise that `low_pass` leaves."""
     return 1.0 if cut is None else min(1.0, 2.0 * NOISE_WIDTH * cut / rate)
+
+
+def removed_share(rate: float, cut: float) -> float:
+    """Return the share of the variance of white noise in what `low_pass` takes out of it."""
+    gain = 1.0 / (1.0 + (np.linspace(0.0, 0.5 * rate / cut, FREQUENCIES)) ** 8)
+    return float(np.mean((1.0 - gain) ** 2))
 
 
 def low_pass_every(signal: Array, rate: float, cut: float | None, step: int, weight: Array | None = None) -> Array:

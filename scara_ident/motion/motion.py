@@ -39,6 +39,9 @@ class Motion(Frozen):
         Recorded torque, as it was recorded (not filtered).
     rate : float
         Samples per second.
+    fade : ndarray, shape (n, N), or None
+        Weight of every sample of each joint's torque, 0 where the joint stands still and friction is unknown, see `fading`;
+        None where nothing is said of it.
     """
 
     name: str
@@ -49,6 +52,7 @@ class Motion(Frozen):
     a: Array
     torque: Array | None
     rate: float
+    fade: Array | None = None
     # A copy of other positions has no such.
     _same: Motion | None = field(default=None, init=False, repr=False)
 
@@ -80,6 +84,7 @@ class Motion(Frozen):
             self.a[:, window],
             None if self.torque is None else self.torque[:, window],
             self.rate,
+            None if self.fade is None else self.fade[:, window],
         )
 
 

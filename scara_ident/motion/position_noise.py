@@ -13,7 +13,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from scara_ident.arrays import NORMAL_MEDIAN, Array, median
-from scara_ident.motion.low_pass import low_pass
+from scara_ident.motion.low_pass import low_pass, removed_share
 from scara_ident.motion.motion import Stretch
 from scara_ident.motion.prepared import PreparedData, PreparedRecording, PreparedStretch
 from scara_ident.motion.rest import REST_NOISE, WIDE, position_cuts, velocity_noise
@@ -30,6 +30,8 @@ NoiseSizes = tuple[tuple[float | None, float], ...]
 # may hold a noisy position to many digits, and an uneven clock to few.
 BEYOND_STEPS = 2.0
 _SIZES: WeakKeyDictionary[PreparedData, tuple[tuple[NoiseSizes, ...], ...]] = WeakKeyDictionary()
+# Beyond this share of the rate there is hardly anything but noise: below it a joint that swings faster than any band may move.
+TOP = 0.35
 # Where steps fall anew is that of a position that has little left of them: with much left, the same ones would come
 # again. Whether it is the motion to less than a step matters not.
 STEPLESS = 0.02
@@ -181,18 +183,30 @@ def noise_sizes(data: PreparedData) -> tuple[tuple[NoiseSizes, ...], ...]:
         def of_recording(item: PreparedRecording) -> tuple[NoiseSizes, ...]:
             steps = tuple(encoder_step(row) for row in item.recording.position)
             return tuple(
-                tuple((step, _white(noise_level(part, joint), step)) for joint, step in enumerate(steps))
-                for part in item.stretches
+                tuple((step, _white(part, joint, step)) for joint, step in enumerate(steps)) for part in item.stretches
             )
 
         _SIZES[data] = tuple(side_by_side(of_recording, data.recordings))
     return _SIZES[data]
 
 
-def _white(level: float, step: float | None) -> float:
+def _white(part: PreparedStretch, joint: int, step: float | None) -> float:
     """Return the standard deviation of what scatters beside the rounding of steps."""
-    rounding = 0.0 if step is None else step / np.sqrt(12.0)
+    level = noise_level(part, joint)
+    if step is None:
+        return level
+    rounding = step / np.sqrt(12.0)
+    if level > BEYOND_STEPS * rounding:
+        # White noise is at the highest frequencies too, where an arm that swings beyond its band moves no more.
+        level = min(level, _level_beyond(part, joint, TOP * part.stretch.rate))
     return float(np.sqrt(level**2 - rounding**2)) if level > BEYOND_STEPS * rounding else 0.0
+
+
+def _level_beyond(part: PreparedStretch, joint: int, cut: float) -> float:
+    """Return the standard deviation of white noise that leaves as much beyond a frequency, Hz, as a position has there."""
+    position, rate = part.stretch.position[joint], part.stretch.rate
+    scatter = median(np.abs(position - low_pass(position, rate, cut))) / NORMAL_MEDIAN
+    return float(scatter / np.sqrt(removed_share(rate, cut)))
 
 
 def noisier(data: PreparedData, seed: int = 0) -> PreparedData:
@@ -215,6 +229,12 @@ def noisier(data: PreparedData, seed: int = 0) -> PreparedData:
 def forget_noisier(data: PreparedData) -> None:
     """Forget what was drawn of recordings in bands that are left."""
     _NOISIER.pop(data, None)
+
+
+def forget_stepless(data: PreparedData) -> None:
+    """Forget the positions without steps that steps were drawn on."""
+    for part in data.stretches:
+        part.stretch.forget_filtered((STEPLESS * part.rate,))
 
 
 def _drawn(data: PreparedData, seed: int) -> PreparedData:

@@ -97,8 +97,10 @@ class PreparedStretch:
 
     @made_once
     def motion(self) -> Motion:
-        """Filtered position, velocity and acceleration on the whole time grid."""
-        return motion_of(self.stretch, position_cuts(self.rate, self.bands))
+        """Filtered position, velocity and acceleration on the whole time grid, with where the joints stand still."""
+        found = motion_of(self.stretch, position_cuts(self.rate, self.bands))
+        still = standstill(self.stretch, found, self.bands) | self.stretch.clipped
+        return replace(found, fade=fading(still, self.rate, self.bands))
 
     @property
     def torque(self) -> Array:
@@ -119,12 +121,17 @@ class PreparedStretch:
     @made_once
     def rest(self) -> NDArray[np.bool_]:
         """Where each joint stands still, shape (n, N), widened by the memory of the position's filter, or is left out."""
-        return standstill(self.stretch, self.motion, self.bands) | self.left_out | self.stretch.clipped
+        return np.asarray((self._moving == 0.0) | self.left_out)
 
     @made_once
     def fade(self) -> Array:
         """Weight of both sides of the equation, shape (n, N): 0 at rest, 1 away from it, see `fading`."""
-        return fading(self.rest, self.rate, self.bands)
+        return self._moving if self.left_out is False else fading(self.rest, self.rate, self.bands)
+
+    @property
+    def _moving(self) -> Array:
+        assert self.motion.fade is not None
+        return self.motion.fade
 
     @made_once
     def used(self) -> NDArray[np.bool_]:

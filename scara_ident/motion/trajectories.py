@@ -22,8 +22,10 @@ from scara_ident.motion.periods import FINE_RATE, LEAST_RANGE, SAME_MOTION, at_r
 LARGEST_SHIFT = 1.0
 # Sample rates that differ by more than this share are not compared sample by sample.
 SAME_RATE = 1e-3
-# A run shorter than this share of another says too little of whether it is its motion.
+# A run shorter than this share of another says too little of whether it is its motion, ...
 LEAST_LENGTH = 0.5
+# ... as do parts that hold less than this share of the range of every joint: at rest all runs are alike.
+LEAST_MOVED = 0.5
 # Most motions are told apart at so few samples per second already, where a shift is known to half a sample only and so much
 # of their range is no difference yet.
 COARSE_RATE = 10.0
@@ -157,7 +159,33 @@ def alignment(reference: Array, other: Array, largest: int) -> int | None:
         before, after = distance[best - 1], distance[best + 1]
         bend = before + after - 2.0 * least
         least -= (before - after) ** 2 / (8.0 * bend) if bend > 0.0 else 0.0
-    return largest - best if least < SAME_MOTION**2 else None
+    if least >= SAME_MOTION**2:
+        return None
+    length = min(reference.shape[-1], other.shape[-1])
+    one, two = reference[:, :length], other[:, :length]
+    size = length - 2 * largest
+    if _holds_motion(one, two, slice(largest, largest + size), slice(best, best + size)):
+        return largest - best
+    # Without their ends the two are at rest, so that these tell: each shift is judged by all that it lays on each other.
+    found, at = SAME_MOTION**2, None
+    for shift in range(-largest, largest + 1):
+        own, others = slice(max(0, shift), length + min(0, shift)), slice(max(0, -shift), length - max(0, shift))
+        apart = float(np.mean(((one[:, own] - two[:, others]) / _ranges(one, two)[:, None]) ** 2))
+        if apart < found and _holds_motion(one, two, own, others):
+            found, at = apart, shift
+    return at
+
+
+def _ranges(one: Array, two: Array) -> Array:
+    """Return the wider range of each joint of two motions, shape (..., n); one that stands still has only noise for it."""
+    spread = np.maximum(np.ptp(one, axis=-1), np.ptp(two, axis=-1))
+    return np.asarray(np.maximum(spread, np.maximum(LEAST_RANGE * np.max(spread, axis=-1, keepdims=True), 1e-12)))
+
+
+def _holds_motion(one: Array, two: Array, own: slice, others: slice) -> bool:
+    """Tell whether parts of two motions hold enough of the range of any joint."""
+    parts = np.maximum(np.ptp(one[:, own], axis=-1), np.ptp(two[:, others], axis=-1))
+    return bool(np.any(parts >= LEAST_MOVED * _ranges(one, two)))
 
 
 def _distances(reference: Array, other: Array, largest: int) -> tuple[Array, int]:
@@ -175,9 +203,7 @@ def _distances(reference: Array, other: Array, largest: int) -> tuple[Array, int
     if length < 4:
         return np.zeros((*reference.shape[:-2], 0)), 0
     largest = min(largest, length // 4)
-    spread = np.maximum(np.ptp(reference[..., :length], axis=-1), np.ptp(other[:, :length], axis=-1))
-    least = np.maximum(LEAST_RANGE * np.max(spread, axis=-1, keepdims=True), 1e-12)
-    scale = np.maximum(spread, least)[..., None]
+    scale = _ranges(reference[..., :length], other[:, :length])[..., None]
     x = reference[..., largest : length - largest] / scale
     y = other[:, :length] / scale
     # By FFT: |x|^2 + |y|^2 - 2 x.y. About a common centre, so that the difference keeps its digits.

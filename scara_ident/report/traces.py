@@ -8,14 +8,14 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from itertools import chain
+from itertools import chain, count
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.effects import EffectTerm
-from scara_ident.estimation.observations import Observations, Raw
+from scara_ident.estimation.observations import Observations
 from scara_ident.model.model import TorqueModel
 from scara_ident.model.terms import Friction
 from scara_ident.motion.low_pass import low_pass
@@ -119,13 +119,13 @@ def traces(observations: Observations, value: Array) -> list[tuple[Trace, ...]]:
     """
     columns = [joint.columns for joint in observations.joints]
 
-    def of_recording(item: PreparedRecording, raws: Sequence[Raw]) -> tuple[Trace, ...]:
+    def of_recording(place: int, item: PreparedRecording) -> tuple[Trace, ...]:
         return tuple(
             _trace(observations.model, value, part, columns, raw, float(item.recording.time[0]))
-            for part, raw in zip(item.stretches, raws, strict=True)
+            for part, raw in zip(item.stretches, observations.raw[place], strict=True)
         )
 
-    return side_by_side(of_recording, observations.data.recordings, observations.raw)
+    return side_by_side(of_recording, count(), observations.data.recordings)
 
 
 def _trace(

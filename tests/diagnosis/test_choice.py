@@ -10,7 +10,14 @@ import numpy as np
 import pytest
 
 from scara_ident.diagnosis.candidates import Candidate
-from scara_ident.diagnosis.choice import _left_again, _sure_once_refined, _worth_fitting, choose, fitted_beside
+from scara_ident.diagnosis.choice import (
+    _each_fitted,
+    _left_again,
+    _sure_once_refined,
+    _worth_fitting,
+    choose,
+    fitted_beside,
+)
 from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.nonlinear_fit import tune
 from scara_ident.diagnosis.selection_step import moved_together
@@ -87,6 +94,26 @@ def test_what_takes_the_place_of_an_effect_in_the_model_does_not_come_in(monkeyp
     assert own.chosen == (spoilt,)
     assert decision.gain > 0.5
     assert (decision.accepted, decision.why) == (False, "takes the place of an effect in the model")
+
+
+def test_a_coarse_fit_that_seems_to_take_the_place_of_another_is_finished_first(monkeypatch):
+    """A second elastic joint of 2400 N m/rad was refused where a coarse fit ended on the way to it, and the first was 864 for 900."""
+    asked = []
+
+    def fitted(step, candidate, *, coarse=False):
+        asked.append(coarse)
+        return SimpleNamespace(scene=SimpleNamespace(together=(1,))), SimpleNamespace(
+            accepted=not coarse, candidate=candidate
+        )
+
+    module = sys.modules[fitted_beside.__module__]
+    monkeypatch.setattr(module, "fitted_with", fitted)
+    monkeypatch.setattr(module, "_if_more", lambda step, decision: decision)
+    for effect, coarse in ((JointElasticity(), [True, False]), (Stribeck(), [True])):
+        item = SimpleNamespace(label="a1", candidate=Candidate(effect, Member(1, (9.0, 0.1))))
+        ((_, decision),) = _each_fitted(None, [item], [item], None)
+        assert decision.accepted == (len(coarse) > 1) and asked == coarse
+        asked.clear()
 
 
 @pytest.mark.parametrize(("left", "there"), [(0.02, True), (0.96, False)])

@@ -128,3 +128,21 @@ def test_one_soft_gear_may_stand_for_two_of_links_that_share_their_inertia():
     beside = replace(scene, together=((family, member), (family, Member(2, (9.0, 0.1)))))
     assert 2 not in {other.joint for _, other in family.instead(beside, member)}
     assert family.instead(replace(scene, value=-scene.value), member) == ()
+
+
+def test_a_fit_begins_elsewhere_as_far_off_as_what_is_tried_is_apart():
+    family, scene = JointElasticity(), scene_of(load_robot())
+    softer, stiffer = family.elsewhere(scene, Member(1, (10.0, 0.5)))
+    assert (softer.joint, stiffer.joint) == (1, 1)
+    assert stiffer.nonlinear[0] / 10.0 == pytest.approx(10.0 / softer.nonlinear[0])
+    # Not beyond what arms have.
+    assert [item.nonlinear[0] > 2.0 for item in family.elsewhere(scene, Member(1, (2.1, 0.5)))] == [True]
+
+
+def test_what_is_not_found_is_stiffer_than_is_seen_and_shares_inertia():
+    family, robot = JointElasticity(), load_robot(example_urdf("ur5_robot.urdf"))
+    scene = scene_of(robot)
+    (other,) = family.unfound(scene, Member(1, (4.0, 0.03)))
+    assert other.joint == 2 and other.nonlinear[0] > scene.band
+    beside = replace(scene, together=((family, Member(1, (4.0, 0.03))), (family, Member(2, (9.0, 0.1)))))
+    assert 2 not in {item.joint for item in family.unfound(beside, Member(1, (4.0, 0.03)))}

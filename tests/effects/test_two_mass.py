@@ -211,6 +211,23 @@ def test_an_estimate_of_no_arm_lets_nothing_grow():
     assert np.all(np.isfinite(lag[0])) and np.abs(lag[0]).max() < 10.0
 
 
+def test_no_swing_is_read_from_samples_in_which_friction_is_unknown():
+    """Of two joints that began at rest, what friction did about turns made a swing that stayed for seconds."""
+    scene, item, change = periodic(load_robot(), {0: 4000.0, 1: 900.0})
+    members = members_with(scene, {0: 4000.0, 1: 900.0})
+    fade, torque = np.ones_like(item.q), item.torque.copy()
+    for start in (0, 500, 900):
+        fade[:, start : start + 40] = 0.0
+        torque[:, start : start + 40] += np.abs(change).max()
+
+    def off(motion: Motion) -> float:
+        found = TwoMasses(Signals(scene, motion), members).change
+        return float(np.linalg.norm((found - change)[:, 100:-100]) / np.linalg.norm(change[:, 100:-100]))
+
+    assert off(replace(item, torque=torque, fade=fade)) < 0.02
+    assert off(replace(item, torque=torque)) > 0.05
+
+
 @pytest.mark.parametrize("recorded", [False, True])
 def test_slopes_add_up_to_the_differences_of_what_all_links_do(recorded: bool):
     _, item, whole = periodic(load_robot(), {0: 12000.0, 1: 2500.0})

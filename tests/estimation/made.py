@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from scara_ident.estimation.joint_rows import JointRows, joined
 from scara_ident.estimation.observations import Observations
+from scara_ident.estimation.sample_columns import SampleColumns
 from scara_ident.model.model import TorqueModel, build_model
 from scara_ident.motion.prepared import PreparedData, PreparedRecording, prepare
 from scara_ident.robot.robot import load_robot
@@ -51,7 +52,8 @@ def together(items: Sequence[Observations]) -> Observations:
     joints, _ = joined([item.joints for item in items], items[0].model.active)
     firsts = np.cumsum([0, *(len(item.data.recordings) for item in items)])
     owner = np.concatenate([item.owner + first for item, first in zip(items, firsts[:-1], strict=True)])
-    return Observations(items[0].model, data, joints, owner, tuple(raw for item in items for raw in item.raw))
+    raw = SampleColumns(items[0].model, data.recordings, tuple(raw for item in items for raw in item.raw))
+    return Observations(items[0].model, data, joints, owner, raw)
 
 
 def rows(rng: np.random.Generator, model: TorqueModel, count: int) -> Array:

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scara_ident.estimation import wls
+from scara_ident.estimation import sample_columns, wls
 from scara_ident.estimation.information import weighted
 from scara_ident.estimation.noise_bias import bias_sentence, noise_bias, noise_shares, noise_torque
 from scara_ident.estimation.observations import informations
-from scara_ident.motion.position_noise import noisier
+from scara_ident.motion.position_noise import STEPLESS, noisier
 from scara_ident.motion.prepared import prepare
 from tests.diagnosis.made import exact_runs, observed
 
@@ -107,3 +107,19 @@ def test_a_repetition_adds_nothing():
     found = noise_bias(seen, weights, once)
     assert found is not None
     assert found[:5] == pytest.approx((twice - once)[:5], rel=0.1)
+
+
+def test_of_more_than_is_held_noise_is_drawn_group_by_group(monkeypatch):
+    seen = observed(coarse(13), WIDE)
+    once = wls(seen).noise_bias
+    assert once is not None
+    monkeypatch.setattr(sample_columns, "MOST_VALUES", 2 * max(part.samples for part in seen.data.stretches))
+    many = observed(coarse(13), WIDE)
+    bias = wls(many).noise_bias
+    assert bias is not None
+    # Other draws of the same noise.
+    assert not np.array_equal(bias, once)
+    assert bias[0] == pytest.approx(once[0], rel=0.3)
+    # What steps were drawn on is not kept.
+    kept = [{cut for _, cut in part.stretch._filtered} for part in many.data.stretches]
+    assert all(STEPLESS * many.data.stretches[0].rate not in cuts for cuts in kept)

@@ -54,7 +54,8 @@ def test_a_push_is_found_with_its_times_and_force_and_only_that():
     ends = {"from", "from_within", "to", "to_within"}
     assert set(event.entry) == {"recording", *ends, "joints", "rms", "rms_by_joint", "kind", "force"}
     assert event.sizes[0] == event.rms
-    assert "left out of the fit" in event.sentence(ROBOT)
+    # Where the force acts is not known.
+    assert event.sentence(ROBOT).endswith(f"{np.linalg.norm(event.force):.3g} N if at the tool; left out of the fit")
     other = observed(plain)
     assert find_events(other, robust_fit(other).value) == ()
 
@@ -137,6 +138,13 @@ def test_each_joint_has_its_own_size_the_largest_first():
     known = replace(one, sizes=())
     assert ", 0.597 N m on joint1 and joint2; left out" in known.sentence(ROBOT)
     assert "rms_by_joint" not in known.entry
+
+
+def test_of_a_recording_explained_worse_for_no_known_reason_none_is_given():
+    whole = Event("run", 0.0, 12.0, ("joint1",), 0.5, "unknown", held_out=True)
+    assert whole.sentence(ROBOT) == "run is explained much worse than the recordings fitted: 0.5 N m on joint1"
+    unsure = replace(whole, kind="parameters unsure").sentence(ROBOT)
+    assert unsure.startswith("run is explained much worse than the recordings fitted (parameters unsure): ")
 
 
 def test_of_very_many_events_the_strongest_are_said():

@@ -94,3 +94,11 @@ def test_a_diagnosis_says_what_it_did_not_look_at(robot: Robot, monkeypatch: pyt
     found = diagnose(robot, runs, catalogue=())
     assert [item.name for item in found.training_after.each] == ["m1_1", "m1_2", "m3_1", "m3_2"]
     assert any("4 of 8 recordings" in note for note in found.notes)
+
+
+def test_where_nothing_can_be_left_out_nothing_is_said(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One short recording, of a single stretch, is more than is held at once."""
+    data, held_out = prepare([run(robot, "a_1", 1)]), prepare([])
+    hold(monkeypatch, 0.1)
+    found, kept, notes = held_at_once(data, held_out)
+    assert (names(found), names(kept), notes) == (["a_1"], [], [])

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from scara_ident.motion.low_pass import differentiate, low_pass, low_pass_every, noise_share
+from scara_ident.motion.low_pass import differentiate, low_pass, low_pass_every, noise_share, removed_share
 from scara_ident.motion.prepared import row_step
 from tests.motion.test_motion import RATE, sine
 
@@ -157,3 +157,9 @@ def test_the_share_of_white_noise_that_passes(cut: float | None):
     passed = low_pass(noise, 500.0, cut)[:, 400:-400]
     # The variance of 40 times 2 B T values is known to 3 % at the narrowest.
     assert np.var(passed) == pytest.approx(noise_share(500.0, cut), rel=0.1)
+
+
+@pytest.mark.parametrize("cut", [40.0, 100.0, 190.0])
+def test_the_share_of_noise_that_is_taken_out_is_what_white_noise_loses(cut: float):
+    noise = np.random.default_rng(0).standard_normal(200_000)
+    assert np.var(noise - low_pass(noise, 500.0, cut)) == pytest.approx(removed_share(500.0, cut), rel=0.02)

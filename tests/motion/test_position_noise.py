@@ -97,6 +97,18 @@ def test_an_encoder_that_scatters_over_its_steps_has_white_noise_beside_them(cou
     assert added == pytest.approx([np.hypot(expected, step / np.sqrt(12.0))] * 2, rel=0.15)
 
 
+@pytest.mark.parametrize("counts", [0.0, 2.0])
+def test_a_joint_that_swings_beyond_its_band_has_no_more_noise_for_it(counts: float):
+    """A fifth of the rate is within what noise is measured in: a swing there was taken for noise at all frequencies."""
+    step = 2.0 * np.pi / 2**16
+    rng = np.random.default_rng(2)
+    swing = 8.0 * np.sin(2.0 * np.pi * 0.2 * np.arange(len(TIME)))
+    data = prepared(step * np.round(SMOOTH / step + swing + counts * rng.standard_normal(SMOOTH.shape)))
+    assert noise_level(data.stretches[0], 0) > 2.0 * max(counts, 1.0) * step
+    ((sizes,),) = noise_sizes(data)
+    assert sizes == ((pytest.approx(step), pytest.approx(counts * step, rel=0.1)),) * 2
+
+
 @pytest.mark.parametrize("band", [None, 0.13])
 def test_steps_are_added_where_the_band_is_so_wide_that_positions_keep_them(band: float | None):
     """Those of a hardly filtered position are no further noise: it was moved as a whole."""

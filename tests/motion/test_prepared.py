@@ -262,3 +262,17 @@ def test_an_identification_does_not_look_for_periods(monkeypatch: pytest.MonkeyP
 def test_bands_that_are_none_are_said(run: Recording, bands, said: str):
     with pytest.raises(UsageError, match=said):
         prepare([run], bands)
+
+
+def test_a_motion_says_where_its_joints_stand_still(run: Recording):
+    part = only(run)
+    assert_array_equal(part.motion.fade == 0.0, part.rest)
+    assert part.fade is part.motion.fade
+    # An event left out is none of the motion's.
+    left_out = np.zeros(part.samples, dtype=bool)
+    left_out[200:260] = True
+    beside = replace(part, left_out=left_out)
+    assert_array_equal(beside.motion.fade, part.motion.fade)
+    assert np.all(beside.fade[:, left_out] == 0.0)
+    assert_array_equal(part.motion.part(100, 300).fade, part.motion.fade[:, 100:300])
+    assert part.motion.with_torque(None).fade is part.motion.fade

@@ -87,6 +87,18 @@ def test_a_piece_of_a_run_is_not_its_repetition_unless_it_holds_half_of_it():
     assert len(groups([run(1, "a_1"), run(1, "a_2", seconds=5.0)])) == 1
 
 
+def test_runs_at_rest_are_not_those_that_begin_at_rest():
+    """Two quarters of a KUKA's log, at rest and about to move by twenty times as much, were taken for repetitions."""
+    resting, later = run(1, "a_1", seconds=4.0), run(1, "b_1", seconds=4.0, seed=1)
+    resting.position[:] = 1e-4 * np.random.default_rng(2).standard_normal(resting.position.shape)
+    begins = np.clip(later.time - 3.0, 0.0, None) ** 2
+    later.position[:] = resting.position[:, ::-1] + np.array([[0.1], [0.2]]) * begins
+    assert len(groups([resting, later])) == 2
+    again = run(1, "b_2", seconds=4.0)
+    again.position[:] = later.position + 1e-4 * np.random.default_rng(3).standard_normal(later.position.shape)
+    assert groups([resting, later, again]) == {frozenset(["a_1"]), frozenset(["b_1", "b_2"])}
+
+
 def test_short_and_empty_input():
     assert trajectories_of([]).labels == ()
     assert trajectories_of([run(1, "a_1", seconds=0.03)]).labels == ("a",)

@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.model.base_parameters import BaseParameters, find_base_parameters
-from scara_ident.model.regressor.derivative import gradient
+from scara_ident.model.regressor.derivative import derivative, gradient
 from scara_ident.model.regressor.kernel import RegressorKernel, build_kernel
 from scara_ident.model.regressor.program import Program
 from scara_ident.model.regressor.recursion import joint_geometry
 from scara_ident.model.regressor.torque import trace_torque
-from scara_ident.model.regressor.tracing import Trace, compile_program
+from scara_ident.model.regressor.tracing import Expr, Scalar, Trace, compile_program
 from scara_ident.model.terms.constraints import Constraint, RealBodies
 from scara_ident.model.terms.term import Column, Filled, StateTorque
 from scara_ident.motion.motion import Motion
@@ -26,6 +26,7 @@ from scara_ident.robot.robot import Robot
 
 # Samples at a time where columns are not kept: few enough for the cache.
 CHUNK = 8192
+_RECORDING = threading.Lock()
 # Mass of a body for which any will do, kg.
 SPECK = 1e-3
 # The SCARA of Indri et al. 2002 and its P_d (equation 2), told by what the reduction finds.
@@ -102,30 +103,52 @@ class RigidBody(Filled):
 
     def torque(self, motion: Motion, value: Array) -> Array:
         """Return the torque of parameters ``value`` (p,) on a motion, shape (n, N), without keeping any column."""
-        robot, program = self.robot, self._program
         bodies, armature = self._standard(value)
-        numbers = list(map(np.asarray, bodies))
-        result = np.empty((robot.n, motion.samples))
-        buffers = np.empty((program.buffers, min(CHUNK, motion.samples)))
-        for start in range(0, motion.samples, CHUNK):
-            some = slice(start, start + CHUNK)
-            states = [row[some] for part in (motion.q, motion.v, motion.a) for row in part]
-            targets = [row[some] for row in result]
-            program.evaluate([*states, *numbers], targets, buffers[:, : len(targets[0])])
+        result = np.empty((self.robot.n, motion.samples))
+        _evaluate(self._program, motion, bodies, result)
         result += armature[:, None] * motion.a
-        result *= robot.row_scale[:, None]
+        result *= self.robot.row_scale[:, None]
+        return result
+
+    def slopes(self, motion: Motion, value: Array, joint: int) -> Array:
+        """Return the derivatives of `torque` by the position, velocity and acceleration of one joint, shape (3, n, N)."""
+        bodies, armature = self._standard(value)
+        result = np.empty((3, self.robot.n, motion.samples))
+        _evaluate(self._slope_program(joint), motion, bodies, result.reshape(-1, motion.samples))
+        result[2, joint] += armature[joint]
+        result *= self.robot.row_scale[:, None]
         return result
 
     @cached_property
-    def _program(self) -> Program:
-        """The torque of the links by positions, velocities, accelerations and bodies, these in the order of `_standard`."""
+    def _traced(self) -> tuple[Trace, list[list[Expr]], list[Scalar]]:
+        """The torque of the links, by joint, of positions, velocities and accelerations, by joint, and of bodies, as in `_standard`."""
         robot, trace, back = self.robot, Trace(), np.argsort(self.robot.order)
-        q, v, a = ([trace.variable(int(j) + part * robot.n) for j in back] for part in range(3))
+        states = [[trace.variable(j + part * robot.n) for j in range(robot.n)] for part in range(3)]
+        q, v, a = ([part[j] for j in back] for part in states)
         used = self._standard(np.ones(len(self.kept)))[0] != 0.0
         bodies = [trace.variable(3 * robot.n + k) if one else 0.0 for k, one in enumerate(used.tolist())]
         rows = [bodies[k : k + 10] for k in range(0, len(bodies), 10)]
         torque = trace_torque(joint_geometry(robot.model), robot.model.gravity, rows, q, v, a)
-        return compile_program(trace, [(joint, torque[int(j)]) for joint, j in enumerate(robot.order)])
+        return trace, states, [torque[int(place)] for place in robot.order]
+
+    @cached_property
+    def _program(self) -> Program:
+        trace, _, torque = self._traced
+        return compile_program(trace, list(enumerate(torque)))
+
+    def _slope_program(self, joint: int) -> Program:
+        """The derivatives of the links' torque by the position, velocity and acceleration of one joint, one after the other."""
+        # Recording what another thread records too would mix them up.
+        with _RECORDING:
+            if joint not in self._slope_programs:
+                trace, states, torque = self._traced
+                slopes = [slope for part in states for slope in derivative(torque, part[joint])]
+                self._slope_programs[joint] = compile_program(trace, list(enumerate(slopes)))
+            return self._slope_programs[joint]
+
+    @cached_property
+    def _slope_programs(self) -> dict[int, Program]:
+        return {}
 
     def pulled_back(self, motion: Motion, weights: Array) -> Array:
         """Differentiate ``sum_ij G_ij W_ij`` of the columns W by the motion, backwards through their arithmetic.
@@ -255,6 +278,17 @@ class RigidBody(Filled):
             return np.asarray((found if same_side else scale * found) + armature * a)
 
         return torque
+
+
+def _evaluate(program: Program, motion: Motion, bodies: Array, result: Array) -> None:
+    """Evaluate a program of states and bodies into rows over the samples of a motion."""
+    numbers = list(map(np.asarray, bodies))
+    buffers = np.empty((program.buffers, min(CHUNK, motion.samples)))
+    for start in range(0, motion.samples, CHUNK):
+        some = slice(start, start + CHUNK)
+        states = [row[some] for part in (motion.q, motion.v, motion.a) for row in part]
+        targets = [row[some] for row in result]
+        program.evaluate([*states, *numbers], targets, buffers[:, : len(targets[0])])
 
 
 def _turning(model: pin.Model) -> list[tuple[int, int]]:

@@ -92,8 +92,9 @@ def copies(samples: Samples) -> Checked:
     """Refuse an effort that holds another joint's numbers: one of the two was never recorded."""
     if samples.effort is None:
         return samples, []
-    moving = np.flatnonzero(~samples.idle()).tolist()
-    for one, other in combinations(moving, 2):
+    # Two that are dead most of the time are alike by that, and the two motors of a wrist may be in what is left.
+    alive = [joint for joint in np.flatnonzero(~samples.idle()).tolist() if not _mostly_one(samples.effort[joint])]
+    for one, other in combinations(alive, 2):
         alike = np.array_equal(samples.position[one], samples.position[other])
         if not alike and np.array_equal(np.abs(samples.effort[one]), np.abs(samples.effort[other])):
             first, second = samples.robot.joints[one], samples.robot.joints[other]
@@ -145,6 +146,11 @@ def coarse_effort(samples: Samples) -> Checked:
         )
         found.append(Finding("coarse_effort", said, samples.count))
     return samples, found
+
+
+def _mostly_one(values: Array) -> bool:
+    """Tell whether an effort has one value most of the time."""
+    return bool(np.max(np.unique(values, return_counts=True)[1]) > DEAD_SHARE * len(values))
 
 
 def _stuck(samples: Samples, joint: int, same: NDArray[np.bool_]) -> NDArray[np.bool_]:

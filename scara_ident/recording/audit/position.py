@@ -134,6 +134,9 @@ def position_unit(samples: Samples) -> Checked:
         fitting = [r for r in readings if _fits(r, robot, joint, low[joint], high[joint], speed[joint])]
         looks = " or ".join(f"{reading.name} ({reading.remedy})" for reading in fitting[:GUESSES])
         guess = f"it looks like {looks}" if fitting else "it is in no unit that the audit knows"
+        ungeared = abs(robot.reduction[joint]) == 1.0 and not robot.prismatic[joint]
+        if ungeared and (not fitting or fitting[0].name == "degrees"):
+            guess += ", or it is the motor's angle (state reduction, and side: motor of position, in robot.yaml)"
     others = [f"{robot.joints[k]}.position" for k in np.flatnonzero(suspect)[1:]]
     also = f" (and {', '.join(others)})" if others else ""
     # What would be within its limits about another zero.

@@ -6,8 +6,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
+from scara_ident.arrays import Array
+from scara_ident.model.regressor.kernel import configurations
 from scara_ident.model.terms.rigid_body import rigid_body
 from scara_ident.robot.robot import Robot, load_robot
 from tests.arms import PLANAR_2R, Link, example_urdf, motion, recorded_torque, write_urdf
@@ -38,8 +41,27 @@ def assert_inverse_dynamics(robot: Robot, samples: int = 30) -> None:
     allowed = 1e-12 * np.max(np.abs(expected)) * robot.n
     np.testing.assert_allclose(found, expected, rtol=0, atol=allowed)
     np.testing.assert_allclose(term.torque(motion(q, v, a), value), expected, rtol=0, atol=allowed)
+    assert_slopes(robot, value, q, v, a)
     pattern = np.any(term.regressor(motion(q, v, a)) != 0.0, axis=2)
     assert not np.any(pattern & ~term.pattern)
+
+
+def assert_slopes(robot: Robot, value: Array, q: Array, v: Array, a: Array) -> None:
+    """Derivatives are those of Pinocchio, of bodies with rotors at their joints."""
+    term, model, order = rigid_body(robot), robot.model, robot.order
+    data, armature = model.createData(), robot.standard_parameters()[10 * robot.n :]
+    found = [term.slopes(motion(q, v, a), value, joint) for joint in range(robot.n)]
+    back = np.argsort(order)
+    for k in range(q.shape[1]):
+        full = configurations(model, q[back, k : k + 1])[:, 0]
+        pin.computeRNEADerivatives(model, data, full, v[back, k], a[back, k])
+        inertia = np.triu(data.M) + np.triu(data.M, 1).T
+        for part, whole in enumerate((data.dtau_dq, data.dtau_dv, inertia)):
+            expected = whole[np.ix_(order, order)] + np.diag(armature * (part == 2))
+            expected = robot.row_scale[:, None] * expected
+            for joint in range(robot.n):
+                allowed = 1e-11 * max(1.0, np.max(np.abs(expected)))
+                np.testing.assert_allclose(found[joint][part, :, k], expected[:, joint], rtol=0, atol=allowed)
 
 
 def test_it_is_inverse_dynamics_on_the_scara03():

@@ -138,6 +138,15 @@ def test_an_effort_that_stands_twice_is_refused(read, sign):
     assert read(made).findings == ()
 
 
+def test_efforts_that_are_dead_most_of_the_time_are_no_copies(read):
+    """Of a TIAGo's wrist, whose two motors read 0 in 98 % of the rows and the same size in the others."""
+    made = columns()
+    alive = np.arange(len(made["time"])) % 60 == 0
+    for joint, sign in {"joint1": 1.0, "joint2": -1.0}.items():
+        made[f"{joint}.effort"] = np.where(alive, sign * made["joint1.effort"], 0.0)
+    assert read(made).effort is not None
+
+
 def test_saturation_is_said_with_share_and_level(read, robot):
     made = columns()
     made["joint1.effort"] = np.clip(made["joint1.effort"], -10.0, 0.3)

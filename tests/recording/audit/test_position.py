@@ -30,6 +30,16 @@ def test_positions_in_another_unit_are_refused_with_the_unit_they_look_like(read
     assert "limits -0.6109 to 3.752 rad" in message
 
 
+def test_without_a_gear_stated_degrees_may_be_the_angle_of_a_motor(read, robot):
+    """Of a TX40, whose encoders count radians behind gears of 32 to 48, which its URDF does not say."""
+    made = columns()
+    for joint in ("joint1", "joint2"):
+        made[f"{joint}.position"] *= 40.0
+    message = refusal(read, made, replace(robot, reduction=np.ones(2)))
+    assert "degrees (multiply by pi/180), or it is the motor's angle (state reduction, and side: motor" in message
+    assert "or it is the motor's angle" not in refusal(read, made)
+
+
 def test_motor_turns_and_a_single_joint_in_degrees_are_seen(read):
     made = columns()
     made["joint2.position"] *= 100 / (2 * np.pi)
