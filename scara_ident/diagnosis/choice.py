@@ -10,7 +10,7 @@ import numpy as np
 from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.candidate_tests import coefficients
 from scara_ident.diagnosis.candidates import Candidate
-from scara_ident.diagnosis.correction import beside_runs, taken_out
+from scara_ident.diagnosis.correction import taken_out, told_beside
 from scara_ident.diagnosis.criteria import SelectionCriteria
 from scara_ident.diagnosis.effect_parameters import parameters_beside, told_size
 from scara_ident.diagnosis.noise_check import noise_objection
@@ -268,7 +268,7 @@ def _left_again(step: SelectionStep, decision: Decision) -> str | None:
     if not candidate.corrects_data:
         return None
     if candidate.effect.of_each_recording:
-        beside = beside_runs(step, candidate)
+        beside = told_beside(step, candidate)
         (rows,) = beside.rows(beside.scene, [candidate])
         first, _ = coefficients(beside.model, rows, step.criteria)
     whole = taken_out(step, candidate)[1].value

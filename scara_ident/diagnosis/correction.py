@@ -8,13 +8,12 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.at_estimate import at_estimate
-from scara_ident.diagnosis.candidate_tests import coefficients
-from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, with_columns
+from scara_ident.diagnosis.candidate_tests import coefficients, examine
+from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, Rows, with_columns
 from scara_ident.diagnosis.selection_step import SelectionStep, observed
 from scara_ident.effects import Scene
 from scara_ident.estimation.least_squares import value_and_weights
-from scara_ident.estimation.run_variation import DELAY
-from scara_ident.estimation.variation_between import run_variation
+from scara_ident.estimation.variation_between import beside_delays, run_variation
 from scara_ident.motion.prepared import PreparedData
 
 # Each leaves a tenth or less of what the last one left.
@@ -75,16 +74,65 @@ def corrected(data: PreparedData, correction: Correction) -> PreparedData:
     return replace(data, recordings=tuple(mended))
 
 
-def beside_runs(step: SelectionStep, candidate: Candidate) -> SelectionStep:
+def told_beside(step: SelectionStep, candidate: Candidate) -> SelectionStep:
     """Return the step that the size of a correction is told beside.
 
-    What runs differ by otherwise is noise to what each recording has of its own, or taken for that where a run moves little.
+    What each recording has of its own is told in the lower part of the band: a controller answers the noise of positions, which
+    makes another of the same size in every recording of a kind of motion. What runs differ by otherwise is noise to it, or taken
+    for it where a run moves little.
+
+    Raises
+    ------
+    RecordingError
+        Where a recording is too short for that part.
     """
     if not candidate.effect.of_each_recording:
         return step
-    joints = with_columns(step.observations, step.columns.rows(step.scene, step.chosen))
-    variation = run_variation(step.observations, joints, step.model.root @ step.model.projected).without(DELAY)
-    return replace(step, variation=variation) if variation else step
+    columns = step.columns.at(lower_bands(step))
+    below = replace(step, columns=columns, variation=None)
+    observations, value = columns.observations, step.model.root @ step.model.projected
+    joints = with_columns(observations, columns.rows(step.scene, step.chosen))
+    variation = run_variation(observations, joints, value)
+    return replace(below, variation=beside_delays(observations, joints, value, variation))
+
+
+def lower_bands(step: SelectionStep) -> tuple[float, ...]:
+    """Return the lower part of the band of every joint, Hz."""
+    return tuple(step.criteria.lower_band * (band or step.scene.band) for band in step.observations.data.bands)
+
+
+def drawn_together(value: Array, covariance: Array) -> Array:
+    """Return what each recording has of its own, drawn to the mean of all as far as it is unsure (Efron and Morris 1975).
+
+    Parameters
+    ----------
+    value : ndarray, shape (k,)
+    covariance : ndarray, shape (k, k)
+        Of these; what all are unsure by alike draws none of them to another. No variance is that of one that tells nothing.
+    """
+    told = np.diag(covariance) > 0.0
+    count = int(np.count_nonzero(told))
+    if count < 2:
+        return np.full(len(value), np.mean(value[told]) if count else 0.0)
+    own, apart = value[told], np.eye(count) - 1.0 / count
+    variance = np.clip(np.diag(apart @ covariance[np.ix_(told, told)] @ apart), np.finfo(float).tiny, None)
+    # Of all recordings by moments (DerSimonian and Laird 1986).
+    sure = 1.0 / variance
+    off = own - np.sum(sure * own) / np.sum(sure)
+    between = max(0.0, (sure @ off**2 - (count - 1)) / (np.sum(sure) - np.sum(sure**2) / np.sum(sure)))
+    sure = 1.0 / (variance + between)
+    mean = float(np.sum(sure * own) / np.sum(sure))
+    drawn = np.full(len(value), mean)
+    drawn[told] += between * sure * (own - mean)
+    return drawn
+
+
+def _more(step: SelectionStep, candidate: Candidate, own: Rows, whole: Array) -> Array:
+    """Return what is to be taken out beside what was."""
+    if not candidate.effect.of_each_recording:
+        return coefficients(step.model, own, step.criteria)[0]
+    (found,) = examine(step.model, [own], step.criteria)
+    return drawn_together(whole + found.value, found.covariance) - whole
 
 
 def taken_out(step: SelectionStep, candidate: Candidate) -> tuple[CandidateColumns, Correction]:
@@ -100,11 +148,11 @@ def taken_out(step: SelectionStep, candidate: Candidate) -> tuple[CandidateColum
         All that was taken out.
     """
     names = tuple(item.name for item in step.observations.data.recordings)
-    step = beside_runs(step, candidate)
-    whole, last = np.zeros(len(candidate.effect.columns(step.scene, candidate.member))), np.inf
+    whole, last, whole_band = np.zeros(len(candidate.effect.columns(step.scene, candidate.member))), np.inf, step
+    step = told_beside(step, candidate)
     for _ in range(MOST_CORRECTIONS):
         (own,) = step.rows(step.scene, [candidate])
-        value, _ = coefficients(step.model, own, step.criteria)
+        value = _more(step, candidate, own, whole)
         size = float(np.linalg.norm(value))
         if candidate.effect.settled(value) or size >= last:
             break
@@ -115,4 +163,8 @@ def taken_out(step: SelectionStep, candidate: Candidate) -> tuple[CandidateColum
         step = replace(step, columns=step.columns.beside(observations))
         estimate, weights = value_and_weights(observed(step), step.offsets)
         step = replace(step, scene=at_estimate(step.scene, step.chosen, estimate), weights=weights)
-    return step.columns, Correction(candidate, whole, names)
+    found = Correction(candidate, whole, names)
+    if not found.of_each:
+        return step.columns, found
+    observations = whole_band.observations
+    return whole_band.columns.beside(observations.with_torque(corrected(observations.data, found))), found

@@ -6,13 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, columns_at_hand
+from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, columns_at_hand, with_columns
 from scara_ident.diagnosis.correction import MOST_CORRECTIONS, Correction, corrected
 from scara_ident.diagnosis.search import Search
 from scara_ident.effects import Scene
 from scara_ident.estimation import Estimate
 from scara_ident.estimation.observations import Observations, observe
-from scara_ident.estimation.run_variation import DELAY
+from scara_ident.estimation.run_variation import RunVariation
+from scara_ident.estimation.variation_between import beside_delays
 from scara_ident.motion.prepared import PreparedData
 
 # Median of the square of a standard normal variable.
@@ -44,17 +45,20 @@ def own_correction(
     candidate, column = found.correction.candidate, found.correction.candidate.effect.coefficients[0]
     mean, apart = float(np.mean(found.correction.value)), float(np.var(found.correction.value, ddof=1))
 
-    def told_by(data: PreparedData) -> dict[str, float]:
+    def told_by(data: PreparedData) -> dict[str, tuple[float, float]]:
         each = observe(found.base, data).each if data.recordings else ()
         return {one.name: _fitted_alone(found, candidate, one, scene, after) for one in each}
 
     known = told_by(training)
-    off = np.array([value - found.correction.of(name)[0] for name, value in known.items()])
+    off = np.array([value - found.correction.of(name)[0] for name, (value, _) in known.items()])
     # Of a normal distribution the median square is this share of the mean; what happened in one of them does not count.
     wrong = float(np.median(off**2)) / MEDIAN_SQUARE if len(off) else np.inf
-    kept = apart / (apart + wrong) if apart > 0.0 else 0.0
-    own = told_by(heads)
-    value = np.array([mean + kept * (own.get(name, mean) - mean) for name in names])
+
+    def drawn(told: float, variance: float) -> float:
+        return mean + (apart / (apart + max(wrong, variance)) * (told - mean) if apart > 0.0 else 0.0)
+
+    own = {name: drawn(*told) for name, told in told_by(heads).items()}
+    value = np.array([own.get(name, mean) for name in names])
     notes = [
         f"{name}: {column.name} {x:.3g} {column.unit} by its first third"
         if name in own
@@ -64,8 +68,10 @@ def own_correction(
     return Correction(candidate, value, names), notes
 
 
-def _fitted_alone(found: Search, candidate: Candidate, one: Observations, scene: Scene, after: Estimate) -> float:
-    """Return the coefficient that leaves the least of one recording once it is taken out, all parameters held.
+def _fitted_alone(
+    found: Search, candidate: Candidate, one: Observations, scene: Scene, after: Estimate
+) -> tuple[float, float]:
+    """Return the coefficient that leaves the least of one recording once it is taken out, all parameters held, and its variance.
 
     What runs differ by besides is noise.
     """
@@ -74,8 +80,9 @@ def _fitted_alone(found: Search, candidate: Candidate, one: Observations, scene:
     (late,) = rows.rows(replace(here, start={one.name: scene.start[one.name]}), [candidate])
     others = rows.rows(here, found.chosen)
     stop = np.cumsum([one.parameters, *(len(next(iter(item.values()))) for item in others)])
-    differing = None if after.variation is None else after.variation.without(DELAY).on(one, after.value)
-    whole, last = 0.0, np.inf
+    joints, nothing = with_columns(one, others), RunVariation((None,) * len(one.joints))
+    differing = beside_delays(one, joints, after.value, after.variation or nothing)
+    whole, last, size = 0.0, np.inf, 0.0
     for _ in range(MOST_CORRECTIONS):
         aim = size = 0.0
         for joint, (column,) in late.items():
@@ -84,11 +91,11 @@ def _fitted_alone(found: Search, candidate: Candidate, one: Observations, scene:
                 if joint in item:
                     left = left - after.value[a:b] @ item[joint]
             both = after.weights[joint] * np.array([column, left])
-            own, rest = both if differing is None else differing.whitened(joint, both)
+            own, rest = differing.whitened(joint, both)
             aim, size = aim + float(own @ rest), size + float(own @ own)
         more = aim / size if size > 0.0 else 0.0
         if abs(more) >= last or candidate.effect.settled(np.array([more])):
             break
         whole, last = whole + more, abs(more)
         one = one.with_torque(corrected(data, Correction(candidate, np.array([whole]), (one.name,))))
-    return whole
+    return whole, 1.0 / size if size > 0.0 else np.inf

@@ -14,7 +14,7 @@ import numpy as np
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.at_estimate import moved_with
 from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, columns_at_hand
-from scara_ident.diagnosis.correction import Correction, corrected
+from scara_ident.diagnosis.correction import Correction, corrected, lower_bands
 from scara_ident.diagnosis.held_out_correction import own_correction
 from scara_ident.diagnosis.held_out_intervals import told_by_others, words_of
 from scara_ident.diagnosis.search import Search
@@ -84,8 +84,11 @@ def _by_recording(found: Search, after: Estimate, data: PreparedData, optional: 
     chosen, seen, notes = list(found.chosen), {}, []
     if correction is not None and own:
         training = [_parted(item.recording)[0] for item in found.uncorrected.data.recordings]
-        known, _ = with_rows(prepare(training, data.bands), needed=False)
-        correction, words = own_correction(found, after, known, heads, scene, tuple(start))
+        bands = lower_bands(found.step)
+        known, below = (
+            with_rows(prepare(firsts, bands), needed=False)[0] for firsts in (training, [head for head, _ in parted])
+        )
+        correction, words = own_correction(found, after, known, below, scene, tuple(start))
         notes += words
     if heads.recordings and optional:
         for one in _observed(found, heads, correction).each:

@@ -10,6 +10,7 @@ import numpy as np
 from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.candidate_tests import examine, gains
 from scara_ident.diagnosis.candidates import with_columns
+from scara_ident.diagnosis.correction import told_beside
 from scara_ident.diagnosis.row_test import examine_rows
 from scara_ident.diagnosis.selection_step import SelectionStep
 from scara_ident.estimation.assumed_variation import (
@@ -19,7 +20,7 @@ from scara_ident.estimation.assumed_variation import (
     ASSUMED_SCALE,
     assumed_variation,
 )
-from scara_ident.estimation.run_variation import DELAY, LEAST_RUNS, RunVariation
+from scara_ident.estimation.run_variation import LEAST_RUNS, RunVariation
 from scara_ident.estimation.variation_between import run_variation
 
 
@@ -75,7 +76,7 @@ def _alike(step: SelectionStep, decision: Decision) -> str | None:
     if shared is None or not shared.differ:
         chance = "" if shared is None else f" (p = {shared.p_value:.1e})"
         return f"that recordings differ in it may be chance, by how the joints disagree{chance}"
-    (again,) = replace(step, variation=variation.without(DELAY) or step.variation).judge([decision.candidate])
+    (again,) = told_beside(step, decision.candidate).judge([decision.candidate])
     return None if again.accepted else f"with what else runs differ by counted as noise, {again.why}"
 
 
