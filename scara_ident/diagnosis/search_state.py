@@ -132,7 +132,9 @@ class SearchState:
             state = state.corrected(candidate)
         else:
             state = replace(state, step=replace(state.step, chosen=(*state.step.chosen, candidate)))
-        if not candidate.corrects_data or candidate.effect.settled(winner.examination.value):
+        told = candidate.effect.of_each_recording or candidate.effect.settled(winner.examination.value)
+        if told or not candidate.corrects_data:
+            # What each recording has of its own is taken out until nothing is left, and once more at the end.
             state = state.only({winner.label})
         # What came in and acts with others may have begun nearer to another minimum.
         step = refined(lowest(state.step) if candidate.effect.together else tune(state.step))
