@@ -8,9 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from scara_ident.diagnosis.acceptance import Decision
-from scara_ident.diagnosis.candidate_tests import coefficients
 from scara_ident.diagnosis.candidates import Candidate
-from scara_ident.diagnosis.correction import taken_out, told_beside
+from scara_ident.diagnosis.correction import still_there, taken_out, told_beside
 from scara_ident.diagnosis.criteria import SelectionCriteria
 from scara_ident.diagnosis.effect_parameters import parameters_beside, told_size
 from scara_ident.diagnosis.noise_check import noise_objection
@@ -268,9 +267,7 @@ def _left_again(step: SelectionStep, decision: Decision) -> str | None:
     if not candidate.corrects_data:
         return None
     if candidate.effect.of_each_recording:
-        beside = told_beside(step, candidate)
-        (rows,) = beside.rows(beside.scene, [candidate])
-        first, _ = coefficients(beside.model, rows, step.criteria)
+        first = still_there(told_beside(step, candidate), candidate, np.zeros_like(first))
     whole = taken_out(step, candidate)[1].value
     if np.max(np.abs(whole - first)) <= step.criteria.lower_change * np.max(np.abs(first)):
         return None

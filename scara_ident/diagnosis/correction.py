@@ -9,11 +9,12 @@ import numpy as np
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.at_estimate import at_estimate
 from scara_ident.diagnosis.candidate_tests import coefficients, examine
-from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, Rows, with_columns
+from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, with_columns
 from scara_ident.diagnosis.selection_step import SelectionStep, observed
 from scara_ident.effects import Scene
 from scara_ident.estimation.least_squares import value_and_weights
-from scara_ident.estimation.variation_between import beside_delays, run_variation
+from scara_ident.estimation.run_variation import DELAY
+from scara_ident.estimation.variation_between import run_variation
 from scara_ident.motion.prepared import PreparedData
 
 # Each leaves a tenth or less of what the last one left.
@@ -92,8 +93,8 @@ def told_beside(step: SelectionStep, candidate: Candidate) -> SelectionStep:
     below = replace(step, columns=columns, variation=None)
     observations, value = columns.observations, step.model.root @ step.model.projected
     joints = with_columns(observations, columns.rows(step.scene, step.chosen))
-    variation = run_variation(observations, joints, value)
-    return replace(below, variation=beside_delays(observations, joints, value, variation))
+    variation = run_variation(observations, joints, value).without(DELAY)
+    return replace(below, variation=variation) if variation else below
 
 
 def lower_bands(step: SelectionStep) -> tuple[float, ...]:
@@ -127,8 +128,17 @@ def drawn_together(value: Array, covariance: Array) -> Array:
     return drawn
 
 
-def _more(step: SelectionStep, candidate: Candidate, own: Rows, whole: Array) -> Array:
-    """Return what is to be taken out beside what was."""
+def still_there(step: SelectionStep, candidate: Candidate, whole: Array) -> Array:
+    """Return what is to be taken out of recordings that so much was taken out of.
+
+    Parameters
+    ----------
+    step : SelectionStep
+        See `told_beside`.
+    candidate : Candidate
+    whole : ndarray, shape (k,)
+    """
+    (own,) = step.rows(step.scene, [candidate])
     if not candidate.effect.of_each_recording:
         return coefficients(step.model, own, step.criteria)[0]
     (found,) = examine(step.model, [own], step.criteria)
@@ -151,8 +161,7 @@ def taken_out(step: SelectionStep, candidate: Candidate) -> tuple[CandidateColum
     whole, last, whole_band = np.zeros(len(candidate.effect.columns(step.scene, candidate.member))), np.inf, step
     step = told_beside(step, candidate)
     for _ in range(MOST_CORRECTIONS):
-        (own,) = step.rows(step.scene, [candidate])
-        value = _more(step, candidate, own, whole)
+        value = still_there(step, candidate, whole)
         size = float(np.linalg.norm(value))
         if candidate.effect.settled(value) or size >= last:
             break

@@ -6,14 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, columns_at_hand, with_columns
+from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, columns_at_hand
 from scara_ident.diagnosis.correction import MOST_CORRECTIONS, Correction, corrected
 from scara_ident.diagnosis.search import Search
 from scara_ident.effects import Scene
 from scara_ident.estimation import Estimate
 from scara_ident.estimation.observations import Observations, observe
-from scara_ident.estimation.run_variation import RunVariation
-from scara_ident.estimation.variation_between import beside_delays
+from scara_ident.estimation.run_variation import DELAY
 from scara_ident.motion.prepared import PreparedData
 
 # Median of the square of a standard normal variable.
@@ -80,8 +79,7 @@ def _fitted_alone(
     (late,) = rows.rows(replace(here, start={one.name: scene.start[one.name]}), [candidate])
     others = rows.rows(here, found.chosen)
     stop = np.cumsum([one.parameters, *(len(next(iter(item.values()))) for item in others)])
-    joints, nothing = with_columns(one, others), RunVariation((None,) * len(one.joints))
-    differing = beside_delays(one, joints, after.value, after.variation or nothing)
+    differing = None if after.variation is None else after.variation.without(DELAY).on(one, after.value)
     whole, last, size = 0.0, np.inf, 0.0
     for _ in range(MOST_CORRECTIONS):
         aim = size = 0.0
@@ -91,7 +89,7 @@ def _fitted_alone(
                 if joint in item:
                     left = left - after.value[a:b] @ item[joint]
             both = after.weights[joint] * np.array([column, left])
-            own, rest = differing.whitened(joint, both)
+            own, rest = both if differing is None else differing.whitened(joint, both)
             aim, size = aim + float(own @ rest), size + float(own @ own)
         more = aim / size if size > 0.0 else 0.0
         if abs(more) >= last or candidate.effect.settled(np.array([more])):

@@ -197,14 +197,9 @@ class RunVariation:
 
     def without(self, kind: int) -> RunVariation:
         """Return the same without a kind."""
+        told = np.arange(len(KINDS)) != kind
         joints = [
-            None
-            if item is None
-            else replace(
-                item,
-                std=np.where(np.arange(len(item.std)) == kind, 0.0, item.std),
-                of_run=np.where(np.arange(len(item.std)) == kind, 0.0, item.of_run),
-            )
+            None if item is None else replace(item, std=item.std * told, of_run=item.of_run * told)
             for item in self.joints
         ]
         return replace(self, joints=tuple(joints))
@@ -216,18 +211,40 @@ class RunVariation:
     @property
     def offsets(self) -> RunVariation | None:
         """The same of the offsets alone; None where they do not differ."""
+        alone = np.arange(len(KINDS)) == OFFSET
         joints = tuple(
             None
             if item is None or item.std[OFFSET] == 0.0
-            else replace(
-                item,
-                std=np.where(np.arange(len(item.std)) == OFFSET, item.std, 0.0),
-                noise=item.noise * np.sqrt(item.memory),
-                memory=1.0,
-            )
+            else replace(item, std=item.std * alone, noise=item.noise * np.sqrt(item.memory), memory=1.0)
             for item in self.joints
         )
         return RunVariation(joints) if any(joints) else None
+
+    def on(self, observations: Observations, value: Array) -> RunVariation:
+        """Return how other runs differ, of which by how much each lies off is not known.
+
+        Parameters
+        ----------
+        observations : Observations
+            Of the other runs.
+        value : ndarray, shape (p,)
+            Parameters of the same model.
+        """
+        firsts = np.searchsorted(observations.owner, np.arange(len(observations.data.recordings) + 1))
+        nothing = np.zeros((len(firsts) - 1, len(KINDS)))
+        joints = [
+            None
+            if item is None
+            else replace(
+                item,
+                directions=directions_of(observations, joint, rows, value),
+                of_run=nothing,
+                bounds=rows.starts[firsts],
+                unsure=nothing,
+            )
+            for joint, (item, rows) in enumerate(zip(self.joints, observations.joints, strict=True))
+        ]
+        return RunVariation(tuple(joints))
 
     def deviations(self, observations: Observations, value: Array) -> tuple[Array, ...]:
         """Return by how much the torque of each run lies off that of the mean run, on every stretch, shape (n, N) each.

@@ -30,8 +30,8 @@ from scara_ident.estimation.shared_delays import SharedDelays, shared_delays
 from scara_ident.estimation.variance_components import components, expected
 from scara_ident.threads import side_by_side
 
-# Beside delays that joints share reversals and viscous friction are free in every run: by more than any is, s and a share of it.
-FREE = (0.1, 1.0)
+# Beside delays that joints share reversals and viscous friction are free in every run.
+FREE = 2
 
 
 def run_variation(
@@ -119,7 +119,9 @@ def _shared(
     late_reversals = observations.late_reversals(value[: observations.parameters])
 
     def of_joint(joint: int, rows: JointRows) -> _Sums | None:
-        directions = _with_free(observations, joint, rows, value, late_reversals[joint])
+        # Joints of added rows have those of the model first.
+        viscous = np.sum(rows.table[: len(observations.joints[joint].columns)][observations.of_speed(joint, 1)], axis=0)
+        directions = np.vstack([directions_of(observations, joint, rows, value), late_reversals[joint], viscous])
         return _sums(directions, rows.left(value), rows.starts, firsts)
 
     pairs = zip(side_by_side(of_joint, range(len(joints)), joints), found.joints, strict=True)
@@ -127,7 +129,7 @@ def _shared(
     if not told:
         return None
     kinds = len(KINDS)
-    priors = np.zeros((len(told), kinds + len(FREE)))
+    priors = np.zeros((len(told), kinds + FREE))
     for place, (own, item) in enumerate(told):
         if item is not None:
             priors[place, :kinds] = (item.std / np.where(own.back[:kinds] > 0.0, own.back[:kinds], np.inf)) ** 2
@@ -141,42 +143,6 @@ def _shared(
         DELAY,
         rms[:, DELAY] / np.maximum(rms[:, SCALE], np.finfo(float).tiny),
     )
-
-
-def beside_delays(
-    observations: Observations, joints: Sequence[JointRows], value: Array, variation: RunVariation
-) -> RunVariation:
-    """Return what a delay of each run is told beside: what else runs differ by, and the kinds of `FREE`.
-
-    Parameters
-    ----------
-    observations, joints, value
-        See `run_variation`.
-    variation : RunVariation
-        How far such runs differ; these may be other runs.
-    """
-    if not observations.raw or any(rows.sizes is not None for rows in joints):
-        return variation.without(DELAY)
-    firsts = np.searchsorted(observations.owner, np.arange(len(observations.data.recordings) + 1))
-    late_reversals = observations.late_reversals(value[: observations.parameters])
-    found = []
-    for joint, (rows, item) in enumerate(zip(joints, variation.joints, strict=True)):
-        directions = _with_free(observations, joint, rows, value, late_reversals[joint])
-        std = np.concatenate([np.zeros(len(KINDS)) if item is None else item.std, FREE])
-        std[DELAY] = 0.0
-        nothing = np.zeros((len(firsts) - 1, len(std)))
-        left = rows.left(value)
-        noise = float(np.sqrt(np.mean(left**2))) if item is None and len(left) else 1.0 if item is None else item.noise
-        memory = 1.0 if item is None else item.memory
-        found.append(JointVariation(directions, std, nothing, noise or 1.0, rows.starts[firsts], nothing, memory))
-    return RunVariation(tuple(found))
-
-
-def _with_free(observations: Observations, joint: int, rows: JointRows, value: Array, late_reversals: Array) -> Array:
-    """Return what one unit of each kind does on the rows of a joint, those of `FREE` last."""
-    # Joints of added rows have those of the model first.
-    viscous = np.sum(rows.table[: len(observations.joints[joint].columns)][observations.of_speed(joint, 1)], axis=0)
-    return np.vstack([directions_of(observations, joint, rows, value), late_reversals, viscous])
 
 
 @dataclass(frozen=True, eq=False)
