@@ -115,16 +115,20 @@ def drawn_together(value: Array, covariance: Array) -> Array:
     count = int(np.count_nonzero(told))
     if count < 2:
         return np.full(len(value), np.mean(value[told]) if count else 0.0)
-    own, apart = value[told], np.eye(count) - 1.0 / count
-    variance = np.clip(np.diag(apart @ covariance[np.ix_(told, told)] @ apart), np.finfo(float).tiny, None)
-    # Of all recordings by moments (DerSimonian and Laird 1986).
-    sure = 1.0 / variance
-    off = own - np.sum(sure * own) / np.sum(sure)
-    between = max(0.0, (sure @ off**2 - (count - 1)) / (np.sum(sure) - np.sum(sure**2) / np.sum(sure)))
-    sure = 1.0 / (variance + between)
-    mean = float(np.sum(sure * own) / np.sum(sure))
-    drawn = np.full(len(value), mean)
-    drawn[told] += between * sure * (own - mean)
+    own, whole = value[told], covariance[np.ix_(told, told)]
+
+    def contrasts(variance: Array) -> tuple[Array, Array]:
+        """Return the precision of what lies off the mean, and the share of each in the mean."""
+        sure = np.linalg.pinv(variance, hermitian=True)
+        shares = np.sum(sure, axis=0) / np.sum(sure)
+        return sure - np.sum(sure) * np.outer(shares, shares), shares
+
+    # How far recordings differ, by moments (DerSimonian and Laird 1986).
+    within, _ = contrasts(whole)
+    between = max(0.0, float(own @ within @ own) - (count - 1)) / float(np.trace(within))
+    within, shares = contrasts(whole + between * np.eye(count))
+    drawn = np.full(len(value), float(shares @ own))
+    drawn[told] += between * (within @ own)
     return drawn
 
 

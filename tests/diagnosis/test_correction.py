@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from scara_ident.diagnosis.candidates import Candidate
-from scara_ident.diagnosis.correction import Correction, corrected, taken_out
+from scara_ident.diagnosis.correction import Correction, corrected, drawn_together, taken_out
 from scara_ident.effects import Member
 from scara_ident.effects.measurement import TimeDelay, shifted
 from scara_ident.effects.recording_delays import DelayOfEachRecording
@@ -94,3 +94,29 @@ def test_a_torque_scale_of_a_run_is_not_taken_for_its_delay():
     assert_allclose(found.value, 0.0, atol=1e-3)
     (first,) = step.judge([candidate])
     assert np.max(np.abs(first.examination.value)) > 5e-3
+
+
+def test_what_a_controller_answers_the_noise_of_positions_with_is_no_delay():
+    """Runs that were late alike came out 5.6 ms apart, as one of them moved little and its controller damped by coarse positions."""
+    rng, runs = np.random.default_rng(5), list(exact_runs())
+    noise = 3e-5 * rng.standard_normal(runs[0].position.shape)
+    answer = -20.0 * np.gradient(noise, runs[0].time, axis=1)
+    runs[0] = replace(runs[0], position=runs[0].position + noise, effort=runs[0].effort + answer)
+    step, candidate = step_beside(runs), Candidate(DelayOfEachRecording(), Member(None))
+    (whole,) = step.judge([candidate])
+    _, found = taken_out(step, candidate)
+    # Surely apart in the whole band, and by nothing in its lower part.
+    assert np.ptp(whole.examination.value) > 3e-3 > 4.0 * np.sqrt(np.max(np.diag(whole.examination.covariance)))
+    assert np.ptp(found.value) < 2e-4
+
+
+def test_what_is_unsure_is_drawn_to_the_others_and_what_all_share_draws_none():
+    value, std = np.array([0.0, 4.0, 1.0, 3.0, 12.0]), np.array([0.01, 0.01, 0.01, 0.01, 20.0])
+    alone = drawn_together(value, np.diag(std**2))
+    assert_allclose(alone[:4], value[:4], atol=0.01)
+    assert alone[4] == pytest.approx(2.0, abs=0.2)
+    assert_allclose(drawn_together(value, np.diag(std**2) + 100.0), alone)
+    # One that tells nothing has the mean of the others, and where chance may make them differ all have it.
+    assert drawn_together(value, np.diag([*std[:4] ** 2, 0.0]))[4] == pytest.approx(2.0, abs=1e-3)
+    assert np.ptp(drawn_together(value[:4], 9.0 * np.eye(4))) == 0.0
+    assert drawn_together(value[:2], np.diag([1.0, 0.0])).tolist() == [0.0, 0.0]
