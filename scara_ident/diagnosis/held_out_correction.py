@@ -72,7 +72,8 @@ def _fitted_alone(
 ) -> tuple[float, float]:
     """Return the coefficient that leaves the least of one recording once it is taken out, all parameters held, and its variance.
 
-    What runs differ by besides is noise.
+    What runs differ by besides is noise. All joints tell the same of one recording: what errors of the parameters make each tell
+    is how unsure that is (DerSimonian and Laird 1986).
     """
     here, rows, data = replace(scene, columns=columns_at_hand(one)), CandidateColumns(one), one.data
     # In a scene of this recording alone there is one column.
@@ -80,20 +81,25 @@ def _fitted_alone(
     others = rows.rows(here, found.chosen)
     stop = np.cumsum([one.parameters, *(len(next(iter(item.values()))) for item in others)])
     differing = None if after.variation is None else after.variation.without(DELAY).on(one, after.value)
-    whole, last, size = 0.0, np.inf, 0.0
+    whole, last = 0.0, np.inf
+    aims, sizes = np.zeros(len(late)), np.zeros(len(late))
     for _ in range(MOST_CORRECTIONS):
-        aim = size = 0.0
-        for joint, (column,) in late.items():
+        for place, (joint, (column,)) in enumerate(late.items()):
             left = one.joints[joint].left(after.value)
             for item, a, b in zip(others, stop[:-1], stop[1:], strict=True):
                 if joint in item:
                     left = left - after.value[a:b] @ item[joint]
             both = after.weights[joint] * np.array([column, left])
             own, rest = both if differing is None else differing.whitened(joint, both)
-            aim, size = aim + float(own @ rest), size + float(own @ own)
-        more = aim / size if size > 0.0 else 0.0
+            aims[place], sizes[place] = own @ rest, own @ own
+        if not np.any(sizes):
+            return whole, np.inf
+        more = float(np.sum(aims) / np.sum(sizes))
         if abs(more) >= last or candidate.effect.settled(np.array([more])):
             break
         whole, last = whole + more, abs(more)
         one = one.with_torque(corrected(data, Correction(candidate, np.array([whole]), (one.name,))))
-    return whole, 1.0 / size if size > 0.0 else np.inf
+    told = sizes > 0.0
+    apart = float(np.sum((aims[told] - more * sizes[told]) ** 2 / sizes[told]))
+    scatter = max(1.0, apart / (np.count_nonzero(told) - 1)) if np.count_nonzero(told) > 1 else 1.0
+    return whole, scatter / float(np.sum(sizes))
