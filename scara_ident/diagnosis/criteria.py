@@ -116,7 +116,7 @@ class SelectionCriteria:
     lower_band: float = _criterion(
         0.35,
         "of the band",
-        "in which what is the same at all frequencies is looked for again, and half-way to it by octaves what noise could make, and parameters of effects that act together",
+        "in which what is the same at all frequencies is looked for again, and what each recording has of its own is told; half-way to it by octaves what noise could make, and parameters of effects that act together",
     )
     lower_change: float = _criterion(
         0.5,

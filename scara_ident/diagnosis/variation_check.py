@@ -13,6 +13,7 @@ from scara_ident.diagnosis.candidates import with_columns
 from scara_ident.diagnosis.correction import told_beside
 from scara_ident.diagnosis.row_test import examine_rows
 from scara_ident.diagnosis.selection_step import SelectionStep
+from scara_ident.errors import RecordingError
 from scara_ident.estimation.assumed_variation import (
     ASSUMED_DELAY,
     ASSUMED_FRICTION,
@@ -76,7 +77,11 @@ def _alike(step: SelectionStep, decision: Decision) -> str | None:
     if shared is None or not shared.differ:
         chance = "" if shared is None else f" (p = {shared.p_value:.1e})"
         return f"that recordings differ in it may be chance, by how the joints disagree{chance}"
-    (again,) = told_beside(step, decision.candidate).judge([decision.candidate])
+    try:
+        beside = told_beside(step, decision.candidate)
+    except RecordingError as error:
+        return f"the lower part of the band does not tell it: {error}"
+    (again,) = beside.judge([decision.candidate])
     return None if again.accepted else f"with what else runs differ by counted as noise, {again.why}"
 
 
