@@ -18,6 +18,7 @@ from scara_ident.diagnosis.choice import (
     choose,
     fitted_beside,
 )
+from scara_ident.diagnosis.correction import Correction
 from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.nonlinear_fit import tune
 from scara_ident.diagnosis.selection_step import moved_together
@@ -122,7 +123,7 @@ def test_little_of_a_delay_is_left_once_it_is_taken_out(left: float, there: bool
     step = step_beside([shifted(run, 0.006) for run in exact_runs()])
     (decision,) = step.judge([Candidate(TimeDelay(), Member(None))])
     assert decision.accepted and _left_again(step, decision) is None
-    whole = (1.0 + left) * decision.examination.value
+    whole = Correction(decision.candidate, (1.0 + left) * decision.examination.value, ())
     monkeypatch.setattr(sys.modules[fitted_beside.__module__], "taken_out", lambda step, _: (step.columns, whole))
     said = _left_again(step, decision)
     assert (said is None) == there
