@@ -28,7 +28,7 @@ LOWEST_FREQUENCY, HIGHEST_FREQUENCY = 2.0, 200.0
 DAMPING = 0.2
 # Damping ratios that the fit may reach: above it does not swing. Those of gears are told with the motor free, whose swinging is
 # faster: behind a motor that is held the ratio is smaller by the root of the rotor's share of both inertias.
-LOWEST_DAMPING, HIGHEST_DAMPING = 0.005, 0.7
+LOWEST_DAMPING, HIGHEST_DAMPING = 0.01, 0.7
 # Of the highest, at which a fit has gone as far as it may.
 ALL_BUT_DAMPED = 0.999
 # A resonance is told from a softer gear by what is above it: the band reaches so many times its frequency.

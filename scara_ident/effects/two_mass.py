@@ -53,7 +53,7 @@ LEAST_SPRING = 0.1
 # The links' mass matrix, scaled to a diagonal of 1, has no smaller eigenvalue, however poor the estimate.
 LEAST_EIGENVALUE = 0.01
 # A swing at the beginning is followed until no more than this share is left of it, and then for so many periods of the band.
-FADED, FADED_PERIODS = 1e-9, 8.0
+FADED, FADED_PERIODS = 1e-6, 8.0
 
 T = TypeVar("T")
 
