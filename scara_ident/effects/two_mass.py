@@ -142,16 +142,16 @@ class TwoMasses:
         return self._solved[0]
 
     @property
-    def _solved(self) -> tuple[Lag, Swing, Signals]:
-        """The lags, the equations of the last of Newton's steps, and the motion that these are linear about."""
+    def _solved(self) -> tuple[Lag, Swing, Signals | None]:
+        """The lags, the equations of the last of Newton's steps, and the motion that these are linear about if links lag there."""
         return self._kept("lag", self._made_lag)
 
-    def _made_lag(self) -> tuple[Lag, Swing, Signals]:
-        signals, own, swing, links = self.signals, self.joints, self.swing, self.signals
+    def _made_lag(self) -> tuple[Lag, Swing, Signals | None]:
+        signals, own, swing, links = self.signals, self.joints, self.swing, None
         lag = self._settled(swing, self._load(signals.rigid[own] + signals.on_links[own], signals.motion.a[own]))
         recorded = signals.motion.torque
         if self._initial is not None and recorded is not None:
-            left = recorded[own] - signals.predicted[own] - signals.on_links[own] - self._on_own(lag, links)
+            left = recorded[own] - signals.predicted[own] - signals.on_links[own] - self._on_own(lag, signals)
             lag = self._initial.added(lag, self._initial.state(left, (lag[0], lag[1])))
         for _ in range(0 if _small(lag) else STEPS - 1):
             links = Signals(signals.scene, self._behind(lag, len(own)))
@@ -236,7 +236,9 @@ class TwoMasses:
         """
         scene, motion, own = self.signals.scene, self.signals.motion, self.joints
         term, carrier = scene.model.rigid_body, place == 0
-        (x, first, second), swing, links = self._solved
+        (x, first, second), swing, lagging_links = self._solved
+        # Nothing that is kept for signals may hold these.
+        links = self.signals if lagging_links is None else lagging_links
         p, moved = term.pattern.shape[1], self._behind(self.lag, len(own))
         bodies = joint_rows(term, moved) if carrier else []
         rotors, usual = np.zeros((2, len(own), p + 3))
