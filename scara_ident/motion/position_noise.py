@@ -32,6 +32,11 @@ BEYOND_STEPS = 2.0
 _SIZES: WeakKeyDictionary[PreparedData, tuple[tuple[NoiseSizes, ...], ...]] = WeakKeyDictionary()
 # Beyond this share of the rate there is hardly anything but noise: below it a joint that swings faster than any band may move.
 TOP = 0.35
+# A swing that the motion excites is small at times, while noise is always there: of so many samples each, with this share of them
+# quieter, an rms is looked at. Fewer than so many of them tell no such share.
+QUIET_SAMPLES = 32
+QUIET_SHARE = 0.1
+LEAST_BLOCKS = 20
 # Where steps fall anew is that of a position that has little left of them: with much left, the same ones would come
 # again. Whether it is the motion to less than a step matters not.
 STEPLESS = 0.02
@@ -194,7 +199,12 @@ def _white(part: PreparedStretch, joint: int, step: float | None) -> float:
     """Return the standard deviation of what scatters beside the rounding of steps."""
     level = noise_level(part, joint)
     if step is None:
-        return level
+        # A position without steps may have been filtered, which leaves no noise at the highest frequencies. What is neither
+        # there nor at all times is motion; noise of uneven stamps grows with speed, but is white.
+        always = _level_at_quietest(part, joint)
+        return (
+            level if always >= level else min(level, max(always, _level_beyond(part, joint, TOP * part.stretch.rate)))
+        )
     rounding = step / np.sqrt(12.0)
     if level > BEYOND_STEPS * rounding:
         # White noise is at the highest frequencies too, where an arm that swings beyond its band moves no more.
@@ -207,6 +217,27 @@ def _level_beyond(part: PreparedStretch, joint: int, cut: float) -> float:
     position, rate = part.stretch.position[joint], part.stretch.rate
     scatter = median(np.abs(position - low_pass(position, rate, cut))) / NORMAL_MEDIAN
     return float(scatter / np.sqrt(removed_share(rate, cut)))
+
+
+def _level_at_quietest(part: PreparedStretch, joint: int) -> float:
+    """Return the standard deviation of noise, taken as white, that leaves what a moving joint has at its quietest beyond its filter.
+
+    Infinite where it moves for too short a time to tell.
+    """
+    smooth, cut = _smooth(part, joint)
+    count = len(smooth) // QUIET_SAMPLES
+    blocks = (part.stretch.position[joint] - smooth)[: count * QUIET_SAMPLES].reshape(count, QUIET_SAMPLES)
+    # An encoder whose steps were filtered away is silent at rest.
+    moving = np.all(part.used[joint][: count * QUIET_SAMPLES].reshape(count, QUIET_SAMPLES), axis=1)
+    if np.count_nonzero(moving) < LEAST_BLOCKS:
+        return float("inf")
+    from scipy.special import chdtri
+
+    left = removed_share(part.stretch.rate, cut)
+    freedom = left * QUIET_SAMPLES
+    usual = chdtri(freedom, 1.0 - QUIET_SHARE) / freedom
+    square = np.quantile(np.mean(blocks[moving] ** 2, axis=1), QUIET_SHARE)
+    return float(np.sqrt(square / (usual * left)))
 
 
 def noisier(data: PreparedData, seed: int = 0) -> PreparedData:

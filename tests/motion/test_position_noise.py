@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.signal import butter, lfilter
 
 from scara_ident.errors import RecordingError
 from scara_ident.identification.identify import identify
@@ -107,6 +108,43 @@ def test_a_joint_that_swings_beyond_its_band_has_no_more_noise_for_it(counts: fl
     assert noise_level(data.stretches[0], 0) > 2.0 * max(counts, 1.0) * step
     ((sizes,),) = noise_sizes(data)
     assert sizes == ((pytest.approx(step), pytest.approx(counts * step, rel=0.1)),) * 2
+
+
+def _ringing() -> np.ndarray:
+    """A swing of 60 Hz that dies away within a quarter of a second, begun anew every 0.8 s."""
+    since = np.mod(TIME, 0.8)
+    return 5e-4 * np.exp(-19.0 * since) * np.sin(2.0 * np.pi * 60.0 * since)
+
+
+@pytest.mark.parametrize("size", [0.0, 2e-6])
+def test_without_steps_what_is_quiet_at_times_is_no_noise(size: float):
+    rng = np.random.default_rng(6)
+    data = prepared(SMOOTH + _ringing() + size * rng.standard_normal(SMOOTH.shape))
+    ((sizes,),) = noise_sizes(data)
+    # Of a position without noise a fiftieth of what the swing was taken for.
+    rest = 0.02 * noise_level(data.stretches[0], 0) if size == 0.0 else 0.15 * size
+    assert [level for _, level in sizes] == pytest.approx([size, size], abs=rest)
+
+
+@given(share=st.floats(0.1, 0.3), order=st.integers(1, 2))
+@settings(max_examples=10, deadline=None)
+def test_filtered_noise_without_steps_stays_noise(share: float, order: int):
+    """It is not at the highest frequencies, as a swing is not; but it is there at all times."""
+    rng = np.random.default_rng(7)
+    noise = lfilter(*butter(order, 2.0 * share), 1e-4 * rng.standard_normal(SMOOTH.shape), axis=1)
+    data = prepared(SMOOTH + noise)
+    ((sizes,),) = noise_sizes(data)
+    for joint, (_, level) in enumerate(sizes):
+        assert level > 0.75 * noise_level(data.stretches[0], joint)
+
+
+def test_noise_that_grows_with_speed_stays_noise_where_it_is_white():
+    """As of stamps of few digits on an uneven clock: at the quietest there is little of it."""
+    rng = np.random.default_rng(8)
+    data = prepared(SMOOTH + 1e-4 * np.gradient(SMOOTH, TIME, axis=1) * rng.standard_normal(SMOOTH.shape))
+    ((sizes,),) = noise_sizes(data)
+    for joint, (_, level) in enumerate(sizes):
+        assert level > 0.85 * noise_level(data.stretches[0], joint)
 
 
 @pytest.mark.parametrize("band", [None, 0.13])
