@@ -45,6 +45,9 @@ UNLIKE = 0.5 - np.sqrt(1.0 / 12.0)
 # Torque and acceleration beyond any band that are so much alike are one swing of the arm; noise of either is no part of
 # the other.
 ALIKE = 0.5
+# A torque that swings acts on other joints as it is, times how much farther the masses that it swings lie from their axes than from
+# its own: the reach of an arm over that of its wrist. One that is less than theirs by more does not shake them.
+LEVER = 10.0
 # Time over which a joint's speed is taken, s, in which the steps of its encoder hardly count.
 SPEED_OVER = 0.1
 
@@ -112,7 +115,7 @@ def unresolved_joints(data: PreparedData) -> dict[int, str]:
 
     What swings beyond half the rate, as under a controller that shakes, stands at other frequencies in what is recorded;
     the signs of speeds and the products of them that the columns hold then do not belong to the torque. Where one joint
-    shakes with more torque than it moves with, all are shaken: none is resolved.
+    shakes with more torque than it moves with, all that it can shake are shaken: none of them is resolved.
 
     Returns
     -------
@@ -135,26 +138,31 @@ def unresolved_joints(data: PreparedData) -> dict[int, str]:
                 "its positions swing too fast and far for the rate, so that rest and motion cannot be told apart: "
                 "find what shakes it, record faster or smoother motions"
             )
-    shaking = _shaking(data)
-    if shaking is not None:
-        why = f"the arm shakes: {shaking}, and friction and sampling make of that what looks like effects: "
-        found |= dict.fromkeys(range(len(data.bands)), why + "find what shakes it, and record smoother motions")
-    return found
+    return found | {
+        joint: f"the arm shakes: {shaking}, and friction and sampling make of that what looks like effects: "
+        "find what shakes it, and record smoother motions"
+        for joint, shaking in _shaken(data).items()
+    }
 
 
-def _shaking(data: PreparedData) -> str | None:
-    """Name a joint whose torque swings more beyond any band than it changes within, and its position with it."""
+def _shaken(data: PreparedData) -> dict[int, str]:
+    """Say by which joint each is shaken: one whose torque swings more beyond any band than it changes within, and its position with it."""
     parts = [(part.stretch, part.stretch.torque) for part in data.stretches if part.stretch.torque is not None]
-    for joint, name in enumerate(data.recordings[0].recording.joints if parts else ()):
-        sides = [_both_sides(torque[joint], part.rate) for part, torque in parts]
-        change, swing = (sum(float(own @ own) for own in side) for side in zip(*sides, strict=True))
-        if swing <= change:
-            continue
+    if not parts:
+        return {}
+    names = data.recordings[0].recording.joints
+    sides = [[_both_sides(torque[joint], part.rate) for part, torque in parts] for joint in range(len(names))]
+    changes, swings = (np.array([sum(float(own[k] @ own[k]) for own in each) for each in sides]) for k in (0, 1))
+    found: dict[int, str] = {}
+    for joint in np.flatnonzero(swings > changes):
         with_it = [_both_sides(np.diff(part.position[joint], 2), part.rate)[1] for part, _ in parts]
-        both = sum(float(a @ b[1:-1]) for a, (_, b) in zip(with_it, sides, strict=True))
-        if abs(both) > ALIKE * np.sqrt(swing * sum(float(own @ own) for own in with_it)):
-            return f"the torque of {name} swings more beyond {WIDE * parts[0][0].rate:.3g} Hz than it changes below"
-    return None
+        both = sum(float(a @ b[1:-1]) for a, (_, b) in zip(with_it, sides[joint], strict=True))
+        if abs(both) <= ALIKE * np.sqrt(swings[joint] * sum(float(own @ own) for own in with_it)):
+            continue
+        why = f"the torque of {names[joint]} swings more beyond {WIDE * parts[0][0].rate:.3g} Hz than it changes below"
+        for other in np.flatnonzero(changes < LEVER**2 * swings[joint]):
+            found.setdefault(int(other), why)
+    return found
 
 
 def _both_sides(signal: Array, rate: float) -> tuple[Array, Array]:

@@ -206,3 +206,15 @@ def test_where_one_joint_shakes_with_more_torque_than_it_moves_with_none_is_reso
     found = unresolved_joints(data)
     assert set(found) == ({0, 1} if shaken else set())
     assert not shaken or "the torque of joint1 swings more beyond 40 Hz" in found[1]
+
+
+@pytest.mark.parametrize(("size", "shaken"), [(1.0, {0, 1}), (0.01, {0})])
+def test_a_joint_that_shakes_with_little_torque_shakes_no_other(size: float, shaken: set[int]):
+    """A TIAGo's wrist, that read 0.002 N m, was said to shake all seven joints and the torso, which had 0.3 N m and more."""
+    time = np.arange(1600) / 200.0
+    wave = np.sin(2.0 * np.pi * 57.0 * time)
+    motion = np.vstack([np.sin(1.3 * time), 0.5 * np.cos(2.1 * time)])
+    torque = np.vstack([size * (motion[0] + 3.0 * wave), 2.0 * motion[1]])
+    motion[0] -= 2e-3 * wave
+    data = prepare([recording(load_robot(), "M_1", time, motion, torque)], (25.0, 25.0))
+    assert set(unresolved_joints(data)) == shaken
