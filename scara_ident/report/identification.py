@@ -25,6 +25,9 @@ from scara_ident.robot.robot import Robot
 
 # Names in a sentence, at the most.
 MOST_NAMED = 12
+# Standard deviations by which no parameter of an arm comes to lie below zero by chance, where a hundred may: one would in 300 identifications by
+# noise of a known size, in some more where it is known from few blocks.
+BEYOND_CHANCE = 4.0
 # What each shape of friction means.
 SHAPES = {
     "lubricated": "takes energy out, and grows ever less with speed",
@@ -133,6 +136,9 @@ def sentences(identification: Identification) -> tuple[str, ...]:
         found.append(
             f"No real arm has these parameters: {'; '.join(possible.reasons)}. Use --method consistent for one that can exist."
         )
+        below = below_zero_said(identification.estimate)
+        if below is not None:
+            found.append(below)
     small = not_told_from_zero(identification)
     if small:
         found.append(f"Within two standard deviations of zero: {listed(small, MOST_NAMED)}.")
@@ -153,6 +159,29 @@ def sentences(identification: Identification) -> tuple[str, ...]:
     if gravity is not None:
         found.append(gravity)
     return tuple(found)
+
+
+def below_zero_said(estimate: Estimate) -> str | None:
+    """Say whether chance makes what lies below zero where no arm's parameter can; None where none does.
+
+    Parameters
+    ----------
+    estimate : Estimate
+        Not held to what an arm can have.
+    """
+    below = [k for k, column in enumerate(estimate.model.columns) if column.nonnegative and estimate.value[k] < 0.0]
+    size = {k: -estimate.value[k] / estimate.std[k] for k in below if 0.0 < estimate.std[k] < np.inf}
+    if not size:
+        return None
+    names, beyond = estimate.model.names, sorted((k for k in size if size[k] > BEYOND_CHANCE), key=lambda k: -size[k])
+    if not beyond:
+        most = max(size, key=lambda k: size[k])
+        return f"What cannot be negative is so by no more than chance: {names[most]} by {size[most]:.2g} standard deviations."
+    said = listed([f"{names[k]} by {size[k]:.2g} standard deviations" for k in beyond], MOST_NAMED)
+    return (
+        f"Below zero by more than chance: {said}. Something that the model lacks or the description has wrong is in them, and may be in "
+        "any parameter; standard deviations hold none of it, and a possible arm hides it: diagnose the recordings."
+    )
 
 
 def weights_said(estimate: Estimate) -> str:
