@@ -15,9 +15,9 @@ from scara_ident.estimation.estimate import PAPER_SAMPLES
 from scara_ident.estimation.noise_bias import bias_sentence
 from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.saved import estimate_dict
-from scara_ident.estimation.urdf_gravity import gravity_sentence, urdf_gravity
 from scara_ident.estimation.urdf_scale import scale_sentence, told_scale, urdf_scale
 from scara_ident.export.result import KEY, rebuild_entry
+from scara_ident.identification.gravity_check import gravity_said
 from scara_ident.identification.identify import Identification, not_told_from_zero, undetermined, worst_validation
 from scara_ident.manners import listed
 from scara_ident.model.urdf_values import urdf_values
@@ -155,7 +155,7 @@ def sentences(identification: Identification) -> tuple[str, ...]:
         found.append(scale_sentence(None, robot))
         return tuple(found)
     found.append(told_scale(identification.estimate, identification.training))
-    gravity = gravity_sentence(urdf_gravity(identification.training))
+    gravity = gravity_said(identification.training)
     if gravity is not None:
         found.append(gravity)
     return tuple(found)
