@@ -22,6 +22,11 @@ from scara_ident.threads import side_by_side
 # Positions have steps where their changes are whole multiples of the least one, but for this much of it in the mean:
 # numbers of random size leave a quarter.
 WHOLE = 0.1
+# An interval longer than so many usual ones has lost samples; a clock is uneven, and its stamps rounded, from these shares of the
+# interval on, as `scara_ident.recording.audit` says so. Finer than this, s, stamps that count from 1970 hold rounding alone.
+LOST, JITTER, COARSE, FINEST = 1.5, 0.03, 0.02, 1e-6
+# Of what rounded stamps would make this share at least is measured, or samples were taken at whole steps of time.
+BY_STAMPS = 0.25
 # Drawn by seed: fits, candidates and what is left all look at the same.
 _NOISIER: WeakKeyDictionary[PreparedData, dict[int, PreparedData]] = WeakKeyDictionary()
 # Of every joint of a stretch the step in which its positions go, if any, and the standard deviation of its white noise.
@@ -195,12 +200,44 @@ def noise_sizes(data: PreparedData) -> tuple[tuple[NoiseSizes, ...], ...]:
 
         def of_recording(item: PreparedRecording) -> tuple[NoiseSizes, ...]:
             steps = tuple(encoder_step(row) for row in item.recording.position)
+            late = stamp_rounding(item.recording.time) / np.sqrt(12.0)
             return tuple(
-                tuple((step, _white(part, joint, step)) for joint, step in enumerate(steps)) for part in item.stretches
+                tuple(
+                    (step, _beside_stamps(part, joint, _white(part, joint, step), late))
+                    for joint, step in enumerate(steps)
+                )
+                for part in item.stretches
             )
 
         _SIZES[data] = tuple(side_by_side(of_recording, data.recordings))
     return _SIZES[data]
+
+
+def stamp_rounding(time: Array) -> float:
+    """Return to what the stamps of an uneven clock are rounded, s; 0 of an even one, and where it is too little to tell.
+
+    Parameters
+    ----------
+    time : ndarray, shape (N,)
+        s.
+    """
+    interval = np.diff(time)
+    usual = median(interval)
+    near = interval[interval < LOST * usual]
+    if not len(near) or float(np.std(near)) <= JITTER * usual:
+        return 0.0
+    rounded = FINEST * float(np.gcd.reduce(np.rint(interval / FINEST).astype(np.int64)))
+    return rounded if rounded > COARSE * usual else 0.0
+
+
+def _beside_stamps(part: PreparedStretch, joint: int, level: float, late: float) -> float:
+    """Return the standard deviation of white noise where stamps lie off by so many seconds (rms), which moves positions by their way in it.
+
+    What a spline through uneven samples makes of that is less at the high frequencies that it is measured at.
+    """
+    moving = part.motion.v[joint][part.used[joint]]
+    made = late * float(np.sqrt(np.mean(moving**2))) if len(moving) else 0.0
+    return made if level < made < level / BY_STAMPS else level
 
 
 def _white(part: PreparedStretch, joint: int, step: float | None) -> float:

@@ -19,6 +19,7 @@ from scara_ident.motion.position_noise import (
     noise_level,
     noise_sizes,
     noisier,
+    stamp_rounding,
     unresolved_joints,
 )
 from scara_ident.motion.prepared import prepare
@@ -218,3 +219,33 @@ def test_a_joint_that_shakes_with_little_torque_shakes_no_other(size: float, sha
     motion[0] -= 2e-3 * wave
     data = prepare([recording(load_robot(), "M_1", time, motion, torque)], (25.0, 25.0))
     assert set(unresolved_joints(data)) == shaken
+
+
+def _uneven(tick: float) -> np.ndarray:
+    """Times of an uneven clock of 125 samples a second, at whole ticks where there are any."""
+    interval = np.random.default_rng(9).uniform(0.6, 1.4, 1500) / 125.0
+    return np.cumsum(tick * np.round(interval / tick) if tick else interval)
+
+
+@pytest.mark.parametrize(("tick", "digits", "noisy"), [(0.0, 1e-3, True), (0.0, 1e-6, False), (2e-3, 1e-3, False)])
+def test_rounded_stamps_of_an_uneven_clock_are_noise_of_the_positions(tick: float, digits: float, noisy: bool):
+    """An arm without an elastic joint had two found: a spline through uneven samples hides half of the noise where it is measured."""
+    time = _uneven(tick)
+    position = np.vstack([np.sin(6.0 * time), 0.5 * np.cos(7.0 * time)])
+    stamps = digits * np.round(time / digits)
+    data = prepare([recording(load_robot(), "M_1", stamps, position, np.zeros_like(position))], (8.0, 8.0))
+    ((sizes,),) = noise_sizes(data)
+    speeds = np.array([6.0, 3.5]) / np.sqrt(2.0)
+    made = speeds * digits / np.sqrt(12.0)
+    for (_, level), size in zip(sizes, made, strict=True):
+        # Speed is the rms of moving samples.
+        assert level == pytest.approx(size, rel=0.1) if noisy else level < 0.2 * speeds[0] * 1e-3 / np.sqrt(12.0)
+
+
+def test_stamps_of_an_even_clock_are_not_rounded():
+    even = np.arange(1000) * 0.008
+    assert stamp_rounding(even) == 0.0
+    lost = np.delete(even, [100, 300, 301])
+    assert stamp_rounding(lost) == 0.0
+    assert stamp_rounding(1e-3 * np.round(_uneven(0.0) / 1e-3)) == pytest.approx(1e-3)
+    assert stamp_rounding(_uneven(0.0)) == 0.0
