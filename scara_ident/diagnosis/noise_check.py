@@ -19,6 +19,9 @@ from scara_ident.estimation.noise_bias import NEGLIGIBLE, noise_shares
 from scara_ident.estimation.run_offsets import offsets_on
 from scara_ident.motion.position_noise import noise_sizes
 
+# How each reason begins that positions with less noise would settle.
+BY_NOISE = "the noise of the positions"
+
 
 def noise_objection(step: SelectionStep, decision: Decision) -> str | None:
     """Say so where an effect is no longer to be believed, or mostly gone, once the positions' noise is taken from it.
@@ -58,16 +61,16 @@ def made_by_noise(step: SelectionStep, decision: Decision) -> str | None:
         return None
     p_value = _left_of(found, left).p_value
     if share < criteria.least_without_noise:
-        return f"the noise of the positions makes it: with that taken off {share:.0%} of it is left, p = {p_value:.1e}"
+        return f"{BY_NOISE} makes it: with that taken off {share:.0%} of it is left, p = {p_value:.1e}"
     # Believed as it is, it may pass what is asked by little, so that most of it need not pass. Of a correction less is asked.
     if decision.gain * share < criteria.least_gain <= decision.gain:
         return (
-            f"the noise of the positions helps it over the detection limit: with that taken off, {share:.1%} of it is left, which "
+            f"{BY_NOISE} helps it over the detection limit: with that taken off, {share:.1%} of it is left, which "
             f"removes {decision.gain * share:.2%} of the squared residual, {criteria.least_gain:.0%} is asked"
         )
     if p_value * step.tried > criteria.family_error:
         return (
-            f"the noise of the positions makes it surer than it is: with that taken off, {share:.1%} of it is left, p = {p_value:.1e} "
+            f"{BY_NOISE} makes it surer than it is: with that taken off, {share:.1%} of it is left, p = {p_value:.1e} "
             f"instead of {found.p_value:.1e}; of one of {step.tried} candidates tried {criteria.family_error / step.tried:.1e} is asked"
         )
     return None
@@ -138,7 +141,7 @@ def made_through_the_controller(step: SelectionStep, decision: Decision) -> str 
         # Noise in the column alone makes the whole band's too small.
         if left <= 1.0 - criteria.lower_change and p_value <= criteria.significant:
             return (
-                "the noise of the positions could make all of it, by what a controller answers it with: below "
+                f"{BY_NOISE} could make all of it, by what a controller answers it with: below "
                 f"{band:.2g} Hz it is {left:.0%} of its size (p = {p_value:.1e}), where one that is there is the same"
             )
     return None

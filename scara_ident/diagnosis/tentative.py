@@ -6,11 +6,14 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 from scara_ident.diagnosis.acceptance import Decision
+from scara_ident.diagnosis.noise_check import BY_NOISE
 from scara_ident.diagnosis.search import Search
 from scara_ident.diagnosis.selection_step import best_of_each
 
 # Of more than this many, the most gaining first, nobody reads the rest; nothing is decided by it.
 MOST = 6
+# What settles an effect that noise may make: the motion that shows it best shows as much of that.
+LESS_NOISE = "record positions with less noise: a finer encoder, time stamps with all their digits"
 
 
 @dataclass(frozen=True)
@@ -64,6 +67,7 @@ def tentative_effects(
         name, joint = candidate.effect.name, candidate.joint(scene)
         if (name, joint) not in believed:
             p_value = min(1.0, decision.examination.p_value * found.tried)
-            words, settled = candidate.effect.description(scene, candidate.member), candidate.effect.experiment
+            words = candidate.effect.description(scene, candidate.member)
+            settled = LESS_NOISE if decision.why.startswith(BY_NOISE) else candidate.effect.experiment
             result.append(TentativeEffect(name, joint, words, decision.why, settled, decision.gain, p_value, decision))
     return tuple(result[:MOST])

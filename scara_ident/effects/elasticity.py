@@ -26,8 +26,9 @@ LOWEST_FREQUENCY, HIGHEST_FREQUENCY = 2.0, 200.0
 # Damping ratio of that swinging. Gears have 0.03 to 0.1, but then the phase after a few swings depends on inertia and
 # stiffness to the percent; the search begins with more, so that what the link does follows from the torque of the last swing.
 DAMPING = 0.2
-# Damping ratios that the fit may reach: below it swings for longer than a move, above it does not swing.
-LOWEST_DAMPING, HIGHEST_DAMPING = 0.02, 0.7
+# Damping ratios that the fit may reach: above it does not swing. Those of gears are told with the motor free, whose swinging is
+# faster: behind a motor that is held the ratio is smaller by the root of the rotor's share of both inertias.
+LOWEST_DAMPING, HIGHEST_DAMPING = 0.01, 0.7
 # Of the highest, at which a fit has gone as far as it may.
 ALL_BUT_DAMPED = 0.999
 # A resonance is told from a softer gear by what is above it: the band reaches so many times its frequency.

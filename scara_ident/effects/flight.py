@@ -21,6 +21,7 @@ from scara_ident.effects.links import (
     held_link_inertia,
     lagging,
     lagging_slopes,
+    link_slopes,
     rigid_rows,
     shared,
     usual_link_inertia,
@@ -105,7 +106,9 @@ class FreeLink:
             moved[-1, flown] = 0.5 * flight.side - place[flown]
         x, first, second = (self.width * part for part in self.lag)
         behind_it = joint_rows(term, behind(motion, j, (x, first, second)))
-        each = lagging_slopes(self.signals, (j,), behind_it, acting, [self._differentiated(moved)])
+        each = lagging_slopes(
+            self.signals, (j,), [link_slopes(self.signals, j)], behind_it, acting, [self._differentiated(moved)]
+        )
         for joint, (places, rows) in enumerate(each):
             if joint == j:
                 rows[np.searchsorted(places, bodies)] += scale * turning * second

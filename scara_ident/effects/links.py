@@ -281,6 +281,7 @@ def lagging(signals: Signals, joint: int, lag: tuple[Array, Array, Array]) -> Ar
 def lagging_slopes(
     signals: Signals,
     joints: Sequence[int],
+    slopes: Sequence[tuple[Array, Array, Array]],
     bodies: Sequence[Array],
     acting: NDArray[np.intp],
     lags: Sequence[tuple[Array, Array, Array]],
@@ -291,6 +292,8 @@ def lagging_slopes(
     ----------
     joints : sequence of int
         Those whose links lag.
+    slopes : sequence of tuple of ndarray, shape (n, N)
+        Of each `link_slopes`, at the motion that the lags are linear about.
     bodies : sequence of ndarray, shape (k, N)
         Of each joint the rigid bodies' columns that act on it, at the motion of the links; none where these do not vary.
     acting : ndarray of int, shape (m,)
@@ -304,7 +307,6 @@ def lagging_slopes(
         The parameters in their order, and their derivatives; of all others they are zero.
     """
     scene, count = signals.scene, signals.motion.samples
-    slopes = [link_slopes(signals, joint) for joint in joints]
     for j in range(scene.robot.n):
         own = np.flatnonzero(scene.model.rigid_body.pattern[j]) if bodies else np.zeros(0, dtype=np.intp)
         places = np.union1d(own, acting)

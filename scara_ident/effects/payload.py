@@ -212,6 +212,8 @@ class PayloadOfRecordings(Effect):
         if self._told(scene.robot)[0] != 0:
             return None
         if value[0] < -SEEN_STDS * std[0]:
+            if _short_of_body(self._told(scene.robot), -value, std):
+                return "its mass would be negative, and no body taken off has such moments: these recordings differ by something else too"
             return "its mass would be negative: these recordings carry less than the others, or differ by no body"
         return _too_heavy(scene, float(value[0]), float(std[0]))
 
@@ -305,6 +307,21 @@ def _body(signals: Signals, shown: Sequence[int]) -> Array:
     held = sorted({*shown_of(robot), *shown_of(robot, BODY_COLUMNS, BODY_COLUMN_SHARE)})
     columns = shared(signals.motion, "payload body", lambda: tool_of(robot).columns(robot, signals.motion)[:, held])
     return columns[:, [held.index(k) for k in shown]]
+
+
+def _short_of_body(shown: Sequence[int], value: Array, std: Array) -> bool:
+    """Whether moments of inertia are clearly less than a mass with such first moments has by lying off the axis (Steiner)."""
+    place = {k: at for at, k in enumerate(shown)}
+    for inertia, across in ((4, (2, 3)), (6, (1, 3)), (9, (1, 2))):
+        if inertia not in place or 0 not in place:
+            continue
+        (mass, own), (of_mass, of_own) = ([each[place[0]], each[place[inertia]]] for each in (value, std))
+        moments = np.array([[value[place[k]], std[place[k]]] for k in across if k in place]).reshape(-1, 2)
+        missing = float(np.sum(moments[:, 0] ** 2)) - mass * own
+        spread = np.hypot(np.linalg.norm(2.0 * np.prod(moments, axis=1)), np.hypot(own * of_mass, mass * of_own))
+        if missing > SEEN_STDS * spread:
+            return True
+    return False
 
 
 def _too_heavy(scene: Scene, mass: float, std: float) -> str | None:

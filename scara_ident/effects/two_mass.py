@@ -9,7 +9,8 @@ where tau_j is the torque that the gear of joint j passes on to the links. Given
 are ordinary differential equations for the lags of all elastic joints under the recorded motion of all motors: what one link
 lags loads the gears of the others, and one after the other they could not be solved, as near a resonance the lags would grow
 from turn to turn. They hold below, at and above the frequency sqrt(k / inertia), at which a link swings while its motor is
-held. They are solved by Newton's method, each step of which is linear in the lags; so are their derivatives by the parameters.
+held. They are solved by Newton's method, each step of which is linear about the lags before it; so are their derivatives by
+the parameters.
 """
 
 from __future__ import annotations
@@ -52,7 +53,7 @@ LEAST_SPRING = 0.1
 # The links' mass matrix, scaled to a diagonal of 1, has no smaller eigenvalue, however poor the estimate.
 LEAST_EIGENVALUE = 0.01
 # A swing at the beginning is followed until no more than this share is left of it, and then for so many periods of the band.
-FADED, FADED_PERIODS = 1e-9, 8.0
+FADED, FADED_PERIODS = 1e-6, 8.0
 
 T = TypeVar("T")
 
@@ -108,62 +109,71 @@ class TwoMasses:
     def _armature(self) -> Array:
         return np.array([self.signals.scene.armature(joint) for joint in self.joints])
 
-    @cached_property
-    def _slopes(self) -> Lag:
-        """Derivatives of the torque of the links by their positions, velocities and accelerations, each (m, m, N)."""
-        signals, own = self.signals, self.joints
-        each = [link_slopes(signals, joint) for joint in own]
+    @property
+    def swing(self) -> Swing:
+        """The equations for the lags about no lag."""
+        return self._kept("swing", lambda: self._swing(self._slopes(self.signals)))
+
+    def _slopes(self, links: Signals) -> Lag:
+        """Return derivatives of the torque of links by their positions, velocities and accelerations, each (m, m, N)."""
+        own = self.joints
+        each = [link_slopes(links, joint) for joint in own]
         by_q, by_v, by_a = (
             np.stack([slopes[k][own] / self._scale[:, None] for slopes in each], axis=1) for k in range(3)
         )
         for a, joint in enumerate(own):
-            by_a[a, a] = held_link_inertia(signals, joint)
+            held = held_link_inertia(links, joint)
+            # The slope by a link's own speed is the rate of its inertia: together they feed no swing, however large it is, but
+            # where a poor estimate has the inertia held there is none.
+            by_v[a, a] = np.where(held > by_a[a, a] - self._armature[a], 0.0, by_v[a, a])
+            by_a[a, a] = held
         return by_q, by_v, _definite(by_a)
 
-    @property
-    def swing(self) -> Swing:
-        """The equations for the lags about no lag."""
-        return self._kept("swing", self._made_swing)
-
-    def _made_swing(self) -> Swing:
-        spring, damping, inertia = (part.copy() for part in self._slopes)
+    def _swing(self, slopes: Lag) -> Swing:
+        spring, damping, inertia = (part.copy() for part in slopes)
         for a, (k, d) in enumerate(zip(self.stiffness, self.damping, strict=True)):
             spring[a, a] = np.maximum(k + spring[a, a], LEAST_SPRING * k)
-            # Coriolis torques of a poor estimate must not feed the swing.
-            damping[a, a] = np.maximum(d + damping[a, a], 0.0)
+            damping[a, a] += d
         return Swing(inertia, damping, spring, 1.0 / self.signals.motion.rate)
 
     @property
     def lag(self) -> Lag:
         """Motors less links, and their first two derivatives, each (m, N)."""
+        return self._solved[0]
+
+    @property
+    def _solved(self) -> tuple[Lag, Swing, Signals | None]:
+        """The lags, the equations of the last of Newton's steps, and the motion that these are linear about if links lag there."""
         return self._kept("lag", self._made_lag)
 
-    def _made_lag(self) -> Lag:
-        signals, own = self.signals, self.joints
-        lag = self._settled(self._load(signals.rigid[own] + signals.on_links[own], signals.motion.a[own]))
+    def _made_lag(self) -> tuple[Lag, Swing, Signals | None]:
+        signals, own, swing, links = self.signals, self.joints, self.swing, None
+        lag = self._settled(swing, self._load(signals.rigid[own] + signals.on_links[own], signals.motion.a[own]))
         recorded = signals.motion.torque
         if self._initial is not None and recorded is not None:
-            left = recorded[own] - signals.predicted[own] - signals.on_links[own] - self._on_own(lag)
+            left = recorded[own] - signals.predicted[own] - signals.on_links[own] - self._on_own(lag, signals)
             lag = self._initial.added(lag, self._initial.state(left, (lag[0], lag[1])))
         for _ in range(0 if _small(lag) else STEPS - 1):
-            moved = self._behind(lag, len(own))
-            load = self._load(self._torque(moved)[own], moved.a[own])
-            for slopes, part in zip(self._slopes, lag, strict=True):
+            links = Signals(signals.scene, self._behind(lag, len(own)))
+            each = self._slopes(links)
+            swing = self._swing(each)
+            load = self._load(self._torque(links.motion)[own], links.motion.a[own])
+            for slopes, part in zip(each, lag, strict=True):
                 load += times(slopes, part)
-            lag = self.swing.solve(load, lag[0][:, :2])
+            lag = swing.solve(load, lag[0][:, :2])
             if self._initial is not None and recorded is not None:
                 left = recorded[own] - signals.predicted[own] - signals.on_links[own] - self._changed(lag)[own]
                 lag = self._initial.added(lag, self._initial.state(left, (lag[0], lag[1])))
-        return lag
+        return lag, swing, links
 
-    def _settled(self, torque: Array) -> Lag:
+    def _settled(self, swing: Swing, torque: Array) -> Lag:
         """Return the lags under torques (..., m, N), from rest where the swing at the beginning is looked for.
 
         Their first samples come from filtered positions of which nobody knows what was before, and may assume any speed.
         """
         if self._initial is None:
-            return self.swing.solve(torque)
-        return self.swing.solve(torque, np.repeat(self.swing.static(torque[..., :1]), 2, axis=-1))
+            return swing.solve(torque)
+        return swing.solve(torque, np.repeat(swing.static(torque[..., :1]), 2, axis=-1))
 
     @property
     def _initial(self) -> InitialState | None:
@@ -182,7 +192,7 @@ class TwoMasses:
         weights = np.where(size > 0.0, 1.0 / np.where(size > 0.0, size, 1.0), 0.0) if len(size) > 1 else np.ones(1)
         fade = np.ones((len(size), count)) if motion.fade is None else motion.fade[self.joints, :count]
         used = slice(trim, min(count, motion.samples - trim))
-        return InitialState(free, self._on_own(free), weights, fade, motion.rate, band, used)
+        return InitialState(free, self._on_own(free, self.signals), weights, fade, motion.rate, band, used)
 
     @property
     def change(self) -> Array:
@@ -226,8 +236,10 @@ class TwoMasses:
         """
         scene, motion, own = self.signals.scene, self.signals.motion, self.joints
         term, carrier = scene.model.rigid_body, place == 0
-        p, (x, first, second) = term.pattern.shape[1], self.lag
-        moved = self._behind(self.lag, len(own))
+        (x, first, second), swing, lagging_links = self._solved
+        # Nothing that is kept for signals may hold these.
+        links = self.signals if lagging_links is None else lagging_links
+        p, moved = term.pattern.shape[1], self._behind(self.lag, len(own))
         bodies = joint_rows(term, moved) if carrier else []
         rotors, usual = np.zeros((2, len(own), p + 3))
         share = np.zeros(p + 3)
@@ -256,23 +268,24 @@ class TwoMasses:
         inertia = self.inertia[place]
         right[-2, place] = -4.0 * np.pi * inertia * (turning[place] * x[place] + ratio[place] * first[place])
         right[-1, place] = -2.0 * turning[place] * inertia * first[place]
-        lags = self._settled(right)
+        lags = self._settled(swing, right)
         begun = None
         if self._initial is not None:
             # The swing at the beginning is fitted again whatever the parameters are.
             count, free = self._initial.count, self._initial.free
-            whole = self._on_own((lags[0][..., :count], lags[1][..., :count], lags[2][..., :count]))
+            whole = self._on_own((lags[0][..., :count], lags[1][..., :count], lags[2][..., :count]), links)
             whole += direct[..., :count]
             for a, at in enumerate(columns):
                 whole[np.searchsorted(acting, at), a] += bodies[own[a]][:, :count]
             added = np.array([
-                sum(lagging(self.signals, j, (free[0][k, a], free[1][k, a], free[2][k, a])) for a, j in enumerate(own))
+                sum(lagging(links, j, (free[0][k, a], free[1][k, a], free[2][k, a])) for a, j in enumerate(own))
                 for k in range(len(free[0]))
             ])  # fmt: skip
             begun = self._initial.state(whole, (x, first)), added
         shared_out = np.flatnonzero(share)
         each = [(lags[0][:, a], lags[1][:, a], lags[2][:, a]) for a in range(len(own))]
-        for joint, (found, rows) in enumerate(lagging_slopes(self.signals, own, bodies, acting, each)):
+        slopes = [link_slopes(links, joint) for joint in own]
+        for joint, (found, rows) in enumerate(lagging_slopes(self.signals, own, slopes, bodies, acting, each)):
             places = np.union1d(found, shared_out)
             result = rows
             if len(places) > len(found):
@@ -287,13 +300,13 @@ class TwoMasses:
             result[np.searchsorted(places, shared_out)] += share[shared_out, None] * self.parts[place][joint]
             yield places, result
 
-    def _on_own(self, lag: Lag) -> Array:
-        """Return what lags (..., m, N) change of their own joints' torques, to first order, recorded side, (..., m, N)."""
+    def _on_own(self, lag: Lag, links: Signals) -> Array:
+        """Return what lags (..., m, N) change of their joints' torques, recorded side, (..., m, N), to first order about links."""
         result = np.zeros(lag[0].shape)
         for b, joint in enumerate(self.joints):
             own = lag[0][..., b, :], lag[1][..., b, :], lag[2][..., b, :]
             for a, other in enumerate(self.joints):
-                result[..., a, :] += lagging_at(self.signals, other, joint, own)
+                result[..., a, :] += lagging_at(links, other, joint, own)
         return result
 
     def _behind(self, lag: Lag, count: int) -> Motion:

@@ -43,6 +43,9 @@ LEAST_RUNS = 3
 SPOKEN_OF = 0.01
 # Delays of runs whose mean is so many of their standard deviations are one delay: no parameter takes up their mean.
 ALIKE = 2.0
+# Probability, by Student's t of so many runs, below which chance does not make their mean: three runs whose mean is two of their
+# standard deviations, no more likely to be late than early, are had once in fourteen times.
+CHANCE = 0.01
 # Directions of a run below this share of the largest are not told apart.
 RANK = 1e-9
 
@@ -165,6 +168,11 @@ class RunVariation:
             late, least = late_alike(item), SPOKEN_OF * rms[SCALE]
             if shared is None and abs(late) * rms[DELAY] > least:
                 found.append(f"{joint} {late_words(item, late)} in all runs alike")
+            few = 0.0 if late else late_by_few(item)
+            if shared is None and abs(few) * rms[DELAY] > least:
+                found.append(
+                    f"{joint} {late_words(item, few)} in {len(item.of_run)} runs, which are too few to tell a delay"
+                )
             units = ("{:.2g} %", "{:.2g} %", "{:.2g} " + robot.torque_unit(j), "{:.2g} ms")
             scales = (100, 100, 1, 1000)
             shown = [
@@ -172,7 +180,7 @@ class RunVariation:
                 if what == _DIFFERING[DELAY] and std > item.reach
                 else f"{what} by {'more than all of it' if scale == 100 and std > 1.0 else unit.format(std * scale)}"
                 for what, std, size, unit, scale in zip(_DIFFERING, item.apart, rms, units, scales, strict=True)
-                if std * size > least and not ((late or shared is not None) and what == _DIFFERING[DELAY])
+                if std * size > least and not ((late or few or shared is not None) and what == _DIFFERING[DELAY])
             ]
             if shown:
                 said = f"{joint} differs from run to run (standard deviation): {', '.join(shown)}"
@@ -317,7 +325,20 @@ class RunVariation:
 
 
 def late_alike(item: JointVariation) -> float:
-    """Return by how much every run is late, s, where they differ little in it; 0 where they do not."""
+    """Return by how much every run is late, s, where they differ little in it, by more than chance; 0 where they do not."""
+    mean = late_by_few(item)
+    if not mean:
+        return 0.0
+    from scipy.special import stdtr
+
+    late = item.of_run[:, DELAY]
+    freedom, apart = len(late) - 1, float(np.std(late, ddof=1))
+    sure = apart == 0.0 or 2.0 * stdtr(freedom, -abs(mean) * np.sqrt(len(late)) / apart) < CHANCE
+    return mean if sure else 0.0
+
+
+def late_by_few(item: JointVariation) -> float:
+    """Return by how much runs are late in the mean, s, where they differ little in it, be that chance; 0 where they do not."""
     late = item.of_run[:, DELAY]
     mean, apart = float(np.mean(late)), float(np.std(late, ddof=1))
     return mean if abs(mean) >= ALIKE * apart else 0.0

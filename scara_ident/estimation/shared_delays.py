@@ -12,9 +12,10 @@ which changes with temperature: of a slow motion the rate of the torque is much 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 
@@ -53,7 +54,13 @@ class SharedDelays:
 
 
 def shared_delays(
-    products: Array, aims: Array, priors: Array, units: Array, kind: int, shares: Array
+    products: Array,
+    aims: Array,
+    priors: Array,
+    units: Array,
+    kind: int,
+    shares: Array,
+    pieces: NDArray[np.intp] | None = None,
 ) -> SharedDelays | None:
     """Pool what joints tell of the delay of each recording.
 
@@ -71,6 +78,8 @@ def shared_delays(
         Place of the delay among the kinds.
     shares : ndarray, shape (joints,)
         Rms torque that one second of delay makes, as a share of each joint's.
+    pieces : ndarray of int, shape (runs,), optional
+        Of which recording each run is a piece: pieces of one have one clock, and one delay.
 
     Returns
     -------
@@ -78,6 +87,18 @@ def shared_delays(
         None where fewer than two recordings tell a delay.
     """
     late, precision = _of_each(products, aims, priors, units, kind)
+    if pieces is None:
+        return _pooled(late, precision, shares)
+    places, place = np.unique(pieces, return_inverse=True)
+    of_piece = np.eye(len(places))[place]
+    total = precision @ of_piece
+    late = np.divide((precision * late) @ of_piece, total, out=np.zeros_like(total), where=total > 0.0)
+    found = _pooled(late, total, shares)
+    return None if found is None else replace(found, of_run=found.of_run[place])
+
+
+def _pooled(late: Array, precision: Array, shares: Array) -> SharedDelays | None:
+    """Pool delays of recordings and their precision, shape (joints, runs) each."""
     told = np.sum(precision, axis=0) > 0.0
     if np.count_nonzero(told) < 2:
         return None

@@ -80,6 +80,12 @@ class UrdfGravity:
         )
 
     @property
+    def borne_out(self) -> bool:
+        """Whether the URDF's bodies show gravity about as stated."""
+        size, found = np.linalg.norm(self.stated), np.linalg.norm(self.found)
+        return bool(size / USUAL < found < size * USUAL and self.degrees < TURNED)
+
+    @property
     def turned(self) -> bool:
         """Whether gravity and inertia are both the other way round, as of efforts of opposite sign."""
         size, found = np.linalg.norm(self.stated), np.linalg.norm(self.found)
@@ -124,14 +130,18 @@ def gravity_sentence(gravity: UrdfGravity | None) -> str | None:
             "springs bear it; log the whole effort, or state gravity: [0, 0, 0] in robot.yaml."
         )
     if gravity.elsewhere:
-        along = near_axis(gravity.found / np.linalg.norm(gravity.found))
-        stated = float(np.linalg.norm(gravity.stated)) * along
-        return (
-            f"Gravity seems to point along {_listed(along)} of the base, {angle(along, gravity.stated):.0f} degrees from what "
-            f"the description says: if the arm is mounted so, state gravity: {_listed(stated)} in robot.yaml; else a joint's "
-            "position may count from another zero than the URDF, as by half a turn of the shoulder (recording, position: offset)."
-        )
+        return elsewhere_sentence(near_axis(gravity.found / np.linalg.norm(gravity.found)), gravity.stated)
     return None
+
+
+def elsewhere_sentence(along: Array, stated: Array) -> str:
+    """Say that gravity points along a direction of length 1, and what to state."""
+    state = float(np.linalg.norm(stated)) * along
+    return (
+        f"Gravity seems to point along {_listed(along)} of the base, {angle(along, stated):.0f} degrees from what "
+        f"the description says: if the arm is mounted so, state gravity: {_listed(state)} in robot.yaml; else a joint's "
+        "position may count from another zero than the URDF, as by half a turn of the shoulder (recording, position: offset)."
+    )
 
 
 def angle(one: Array, other: Array) -> float:

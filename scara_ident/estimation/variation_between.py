@@ -28,6 +28,7 @@ from scara_ident.estimation.run_variation import (
 )
 from scara_ident.estimation.shared_delays import SharedDelays, shared_delays
 from scara_ident.estimation.variance_components import components, expected
+from scara_ident.recording.pieces import of_one_run
 from scara_ident.threads import side_by_side
 
 # Beside delays that joints share reversals and viscous friction are free in every run.
@@ -116,6 +117,10 @@ def _shared(
     """Return the delays of runs that joints tell together, beside what else runs differ by, free reversals and viscous friction."""
     if not observations.raw or any(rows.sizes is not None for rows in joints):
         return None
+    pieces = of_one_run([item.recording for item in observations.data.recordings])
+    if not np.any(pieces):
+        # One clock, and one delay: what its pieces differ by along it is something else.
+        return SharedDelays(np.zeros(len(pieces)), 0.0, 1.0, 0.0)
     late_reversals = observations.late_reversals(value[: observations.parameters])
 
     def of_joint(joint: int, rows: JointRows) -> _Sums | None:
@@ -142,6 +147,7 @@ def _shared(
         np.array([own.back[DELAY] for own, _ in told]),
         DELAY,
         rms[:, DELAY] / np.maximum(rms[:, SCALE], np.finfo(float).tiny),
+        pieces,
     )
 
 

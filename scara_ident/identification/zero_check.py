@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,16 +14,13 @@ from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.urdf_gravity import near_axis, urdf_gravity
 from scara_ident.identification.channel_comparison import ALIKE, far_less, friction_pushes, held_out, mean
 from scara_ident.identification.channel_fault import ChannelFault, faults_of, in_words
-from scara_ident.identification.channel_reading import JointReading, Reading, as_mapped, has_zeros, observed_as
+from scara_ident.identification.channel_reading import JointReading, Reading, has_zeros, observed_as
 from scara_ident.identification.few_rows import FewRows
+from scara_ident.identification.gravity_check import SAME_GRAVITY, left_under, other_gravities
 from scara_ident.identification.reading_search import SAME, ZERO_COST, cost, searched
-from scara_ident.model.model import TorqueModel
-from scara_ident.model.terms.rigid_body import RigidBody, rigid_body
 
 # Readings that leave as much and are named; of more nothing is told.
 MOST_RIVALS = 2
-# Share of gravity by which another direction differs.
-SAME_GRAVITY = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,20 +131,11 @@ def _common(readings: Sequence[Reading]) -> Reading:
 
 def _other_gravity(held: Observations, rows: FewRows) -> float:
     """Return what is left at least where the arm stands otherwise: gravity along an axis of the base, or as the URDF's bodies show it."""
-    robot = held.model.robot
-    stated = np.asarray(robot.model.gravity.linear, dtype=float)
+    stated = np.asarray(held.model.robot.model.gravity.linear, dtype=float)
     size = float(np.linalg.norm(stated))
-    directions = [size * side * axis for axis in np.eye(3) for side in (1.0, -1.0)]
+    directions = list(other_gravities(stated))
     shown = urdf_gravity(held)
     if shown is not None and np.linalg.norm(shown.found) > 0.0:
-        directions.append(size * near_axis(shown.found / np.linalg.norm(shown.found)))
-    least = np.inf
-    for gravity in directions if size > 0.0 else ():
-        if np.linalg.norm(gravity - stated) > SAME_GRAVITY * size:
-            model = robot.model.copy()
-            model.gravity.linear = gravity
-            standing = replace(robot, model=model)
-            terms = (rigid_body(standing) if isinstance(own, RigidBody) else own for own in held.model.terms)
-            other = replace(rows, model=TorqueModel(held.model.name, standing, tuple(terms)), _left={})
-            least = min(least, mean(other.left(as_mapped(robot.n))))
-    return least
+        found = size * near_axis(shown.found / np.linalg.norm(shown.found))
+        directions += [found] if np.linalg.norm(found - stated) > SAME_GRAVITY * size else []
+    return min((left_under(rows, gravity) for gravity in directions), default=np.inf)

@@ -22,6 +22,11 @@ from scara_ident.threads import side_by_side
 # Positions have steps where their changes are whole multiples of the least one, but for this much of it in the mean:
 # numbers of random size leave a quarter.
 WHOLE = 0.1
+# An interval longer than so many usual ones has lost samples; a clock is uneven, and its stamps rounded, from these shares of the
+# interval on, as `scara_ident.recording.audit` says so. Finer than this, s, stamps that count from 1970 hold rounding alone.
+LOST, JITTER, COARSE, FINEST = 1.5, 0.03, 0.02, 1e-6
+# Of what rounded stamps would make this share at least is measured, or samples were taken at whole steps of time.
+BY_STAMPS = 0.25
 # Drawn by seed: fits, candidates and what is left all look at the same.
 _NOISIER: WeakKeyDictionary[PreparedData, dict[int, PreparedData]] = WeakKeyDictionary()
 # Of every joint of a stretch the step in which its positions go, if any, and the standard deviation of its white noise.
@@ -32,6 +37,11 @@ BEYOND_STEPS = 2.0
 _SIZES: WeakKeyDictionary[PreparedData, tuple[tuple[NoiseSizes, ...], ...]] = WeakKeyDictionary()
 # Beyond this share of the rate there is hardly anything but noise: below it a joint that swings faster than any band may move.
 TOP = 0.35
+# A swing that the motion excites is small at times, while noise is always there: of so many samples each, with this share of them
+# quieter, an rms is looked at. Fewer than so many of them tell no such share.
+QUIET_SAMPLES = 32
+QUIET_SHARE = 0.1
+LEAST_BLOCKS = 20
 # Where steps fall anew is that of a position that has little left of them: with much left, the same ones would come
 # again. Whether it is the motion to less than a step matters not.
 STEPLESS = 0.02
@@ -40,6 +50,9 @@ UNLIKE = 0.5 - np.sqrt(1.0 / 12.0)
 # Torque and acceleration beyond any band that are so much alike are one swing of the arm; noise of either is no part of
 # the other.
 ALIKE = 0.5
+# A torque that swings acts on other joints as it is, times how much farther the masses that it swings lie from their axes than from
+# its own: the reach of an arm over that of its wrist. One that is less than theirs by more does not shake them.
+LEVER = 10.0
 # Time over which a joint's speed is taken, s, in which the steps of its encoder hardly count.
 SPEED_OVER = 0.1
 
@@ -107,7 +120,7 @@ def unresolved_joints(data: PreparedData) -> dict[int, str]:
 
     What swings beyond half the rate, as under a controller that shakes, stands at other frequencies in what is recorded;
     the signs of speeds and the products of them that the columns hold then do not belong to the torque. Where one joint
-    shakes with more torque than it moves with, all are shaken: none is resolved.
+    shakes with more torque than it moves with, all that it can shake are shaken: none of them is resolved.
 
     Returns
     -------
@@ -130,26 +143,31 @@ def unresolved_joints(data: PreparedData) -> dict[int, str]:
                 "its positions swing too fast and far for the rate, so that rest and motion cannot be told apart: "
                 "find what shakes it, record faster or smoother motions"
             )
-    shaking = _shaking(data)
-    if shaking is not None:
-        why = f"the arm shakes: {shaking}, and friction and sampling make of that what looks like effects: "
-        found |= dict.fromkeys(range(len(data.bands)), why + "find what shakes it, and record smoother motions")
-    return found
+    return found | {
+        joint: f"the arm shakes: {shaking}, and friction and sampling make of that what looks like effects: "
+        "find what shakes it, and record smoother motions"
+        for joint, shaking in _shaken(data).items()
+    }
 
 
-def _shaking(data: PreparedData) -> str | None:
-    """Name a joint whose torque swings more beyond any band than it changes within, and its position with it."""
+def _shaken(data: PreparedData) -> dict[int, str]:
+    """Say by which joint each is shaken: one whose torque swings more beyond any band than it changes within, and its position with it."""
     parts = [(part.stretch, part.stretch.torque) for part in data.stretches if part.stretch.torque is not None]
-    for joint, name in enumerate(data.recordings[0].recording.joints if parts else ()):
-        sides = [_both_sides(torque[joint], part.rate) for part, torque in parts]
-        change, swing = (sum(float(own @ own) for own in side) for side in zip(*sides, strict=True))
-        if swing <= change:
-            continue
+    if not parts:
+        return {}
+    names = data.recordings[0].recording.joints
+    sides = [[_both_sides(torque[joint], part.rate) for part, torque in parts] for joint in range(len(names))]
+    changes, swings = (np.array([sum(float(own[k] @ own[k]) for own in each) for each in sides]) for k in (0, 1))
+    found: dict[int, str] = {}
+    for joint in np.flatnonzero(swings > changes):
         with_it = [_both_sides(np.diff(part.position[joint], 2), part.rate)[1] for part, _ in parts]
-        both = sum(float(a @ b[1:-1]) for a, (_, b) in zip(with_it, sides, strict=True))
-        if abs(both) > ALIKE * np.sqrt(swing * sum(float(own @ own) for own in with_it)):
-            return f"the torque of {name} swings more beyond {WIDE * parts[0][0].rate:.3g} Hz than it changes below"
-    return None
+        both = sum(float(a @ b[1:-1]) for a, (_, b) in zip(with_it, sides[joint], strict=True))
+        if abs(both) <= ALIKE * np.sqrt(swings[joint] * sum(float(own @ own) for own in with_it)):
+            continue
+        why = f"the torque of {names[joint]} swings more beyond {WIDE * parts[0][0].rate:.3g} Hz than it changes below"
+        for other in np.flatnonzero(changes < LEVER**2 * swings[joint]):
+            found.setdefault(int(other), why)
+    return found
 
 
 def _both_sides(signal: Array, rate: float) -> tuple[Array, Array]:
@@ -182,19 +200,56 @@ def noise_sizes(data: PreparedData) -> tuple[tuple[NoiseSizes, ...], ...]:
 
         def of_recording(item: PreparedRecording) -> tuple[NoiseSizes, ...]:
             steps = tuple(encoder_step(row) for row in item.recording.position)
+            late = stamp_rounding(item.recording.time) / np.sqrt(12.0)
             return tuple(
-                tuple((step, _white(part, joint, step)) for joint, step in enumerate(steps)) for part in item.stretches
+                tuple(
+                    (step, _beside_stamps(part, joint, _white(part, joint, step), late))
+                    for joint, step in enumerate(steps)
+                )
+                for part in item.stretches
             )
 
         _SIZES[data] = tuple(side_by_side(of_recording, data.recordings))
     return _SIZES[data]
 
 
+def stamp_rounding(time: Array) -> float:
+    """Return to what the stamps of an uneven clock are rounded, s; 0 of an even one, and where it is too little to tell.
+
+    Parameters
+    ----------
+    time : ndarray, shape (N,)
+        s.
+    """
+    interval = np.diff(time)
+    usual = median(interval)
+    near = interval[interval < LOST * usual]
+    if not len(near) or float(np.std(near)) <= JITTER * usual:
+        return 0.0
+    rounded = FINEST * float(np.gcd.reduce(np.rint(interval / FINEST).astype(np.int64)))
+    return rounded if rounded > COARSE * usual else 0.0
+
+
+def _beside_stamps(part: PreparedStretch, joint: int, level: float, late: float) -> float:
+    """Return the standard deviation of white noise where stamps lie off by so many seconds (rms), which moves positions by their way in it.
+
+    What a spline through uneven samples makes of that is less at the high frequencies that it is measured at.
+    """
+    moving = part.motion.v[joint][part.used[joint]]
+    made = late * float(np.sqrt(np.mean(moving**2))) if len(moving) else 0.0
+    return made if level < made < level / BY_STAMPS else level
+
+
 def _white(part: PreparedStretch, joint: int, step: float | None) -> float:
     """Return the standard deviation of what scatters beside the rounding of steps."""
     level = noise_level(part, joint)
     if step is None:
-        return level
+        # A position without steps may have been filtered, which leaves no noise at the highest frequencies. What is neither
+        # there nor at all times is motion; noise of uneven stamps grows with speed, but is white.
+        always = _level_at_quietest(part, joint)
+        return (
+            level if always >= level else min(level, max(always, _level_beyond(part, joint, TOP * part.stretch.rate)))
+        )
     rounding = step / np.sqrt(12.0)
     if level > BEYOND_STEPS * rounding:
         # White noise is at the highest frequencies too, where an arm that swings beyond its band moves no more.
@@ -207,6 +262,27 @@ def _level_beyond(part: PreparedStretch, joint: int, cut: float) -> float:
     position, rate = part.stretch.position[joint], part.stretch.rate
     scatter = median(np.abs(position - low_pass(position, rate, cut))) / NORMAL_MEDIAN
     return float(scatter / np.sqrt(removed_share(rate, cut)))
+
+
+def _level_at_quietest(part: PreparedStretch, joint: int) -> float:
+    """Return the standard deviation of noise, taken as white, that leaves what a moving joint has at its quietest beyond its filter.
+
+    Infinite where it moves for too short a time to tell.
+    """
+    smooth, cut = _smooth(part, joint)
+    count = len(smooth) // QUIET_SAMPLES
+    blocks = (part.stretch.position[joint] - smooth)[: count * QUIET_SAMPLES].reshape(count, QUIET_SAMPLES)
+    # An encoder whose steps were filtered away is silent at rest.
+    moving = np.all(part.used[joint][: count * QUIET_SAMPLES].reshape(count, QUIET_SAMPLES), axis=1)
+    if np.count_nonzero(moving) < LEAST_BLOCKS:
+        return float("inf")
+    from scipy.special import chdtri
+
+    left = removed_share(part.stretch.rate, cut)
+    freedom = left * QUIET_SAMPLES
+    usual = chdtri(freedom, 1.0 - QUIET_SHARE) / freedom
+    square = np.quantile(np.mean(blocks[moving] ** 2, axis=1), QUIET_SHARE)
+    return float(np.sqrt(square / (usual * left)))
 
 
 def noisier(data: PreparedData, seed: int = 0) -> PreparedData:

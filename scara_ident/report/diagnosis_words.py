@@ -15,8 +15,8 @@ from scara_ident.diagnosis.next_steps import next_steps
 from scara_ident.diagnosis.outcome import Unexplained
 from scara_ident.effects import Parameter
 from scara_ident.estimation.run_offsets import rms_of
-from scara_ident.estimation.urdf_gravity import gravity_sentence, urdf_gravity
 from scara_ident.estimation.urdf_scale import told_scale
+from scara_ident.identification.gravity_check import gravity_said
 from scara_ident.model.terms.friction import Friction
 from scara_ident.report.identification import bias_said
 from scara_ident.robot.rotors import GUESS_FACTOR
@@ -85,7 +85,7 @@ def sentences(diagnosis: Diagnosis) -> tuple[str, ...]:
         if not remainder.signals:
             found += [f"To do first: {step.sentence()}" for step in next_steps(diagnosis)[:1]]
     found.append(told_scale(diagnosis.after, diagnosis.training_after))
-    gravity = gravity_sentence(urdf_gravity(diagnosis.training_before))
+    gravity = gravity_said(diagnosis.training_before)
     if gravity is not None:
         found.append(gravity)
     return tuple(found)

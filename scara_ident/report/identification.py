@@ -15,9 +15,9 @@ from scara_ident.estimation.estimate import PAPER_SAMPLES
 from scara_ident.estimation.noise_bias import bias_sentence
 from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.saved import estimate_dict
-from scara_ident.estimation.urdf_gravity import gravity_sentence, urdf_gravity
 from scara_ident.estimation.urdf_scale import scale_sentence, told_scale, urdf_scale
 from scara_ident.export.result import KEY, rebuild_entry
+from scara_ident.identification.gravity_check import gravity_said
 from scara_ident.identification.identify import Identification, not_told_from_zero, undetermined, worst_validation
 from scara_ident.manners import listed
 from scara_ident.model.urdf_values import urdf_values
@@ -25,6 +25,9 @@ from scara_ident.robot.robot import Robot
 
 # Names in a sentence, at the most.
 MOST_NAMED = 12
+# Standard deviations by which no parameter of an arm comes to lie below zero by chance, where a hundred may: one would in 300 identifications by
+# noise of a known size, in some more where it is known from few blocks.
+BEYOND_CHANCE = 4.0
 # What each shape of friction means.
 SHAPES = {
     "lubricated": "takes energy out, and grows ever less with speed",
@@ -133,6 +136,9 @@ def sentences(identification: Identification) -> tuple[str, ...]:
         found.append(
             f"No real arm has these parameters: {'; '.join(possible.reasons)}. Use --method consistent for one that can exist."
         )
+        below = below_zero_said(identification.estimate)
+        if below is not None:
+            found.append(below)
     small = not_told_from_zero(identification)
     if small:
         found.append(f"Within two standard deviations of zero: {listed(small, MOST_NAMED)}.")
@@ -149,10 +155,33 @@ def sentences(identification: Identification) -> tuple[str, ...]:
         found.append(scale_sentence(None, robot))
         return tuple(found)
     found.append(told_scale(identification.estimate, identification.training))
-    gravity = gravity_sentence(urdf_gravity(identification.training))
+    gravity = gravity_said(identification.training)
     if gravity is not None:
         found.append(gravity)
     return tuple(found)
+
+
+def below_zero_said(estimate: Estimate) -> str | None:
+    """Say whether chance makes what lies below zero where no arm's parameter can; None where none does.
+
+    Parameters
+    ----------
+    estimate : Estimate
+        Not held to what an arm can have.
+    """
+    below = [k for k, column in enumerate(estimate.model.columns) if column.nonnegative and estimate.value[k] < 0.0]
+    size = {k: -estimate.value[k] / estimate.std[k] for k in below if 0.0 < estimate.std[k] < np.inf}
+    if not size:
+        return None
+    names, beyond = estimate.model.names, sorted((k for k in size if size[k] > BEYOND_CHANCE), key=lambda k: -size[k])
+    if not beyond:
+        most = max(size, key=lambda k: size[k])
+        return f"What cannot be negative is so by no more than chance: {names[most]} by {size[most]:.2g} standard deviations."
+    said = listed([f"{names[k]} by {size[k]:.2g} standard deviations" for k in beyond], MOST_NAMED)
+    return (
+        f"Below zero by more than chance: {said}. Something that the model lacks or the description has wrong is in them, and may be in "
+        "any parameter; standard deviations hold none of it, and a possible arm hides it: diagnose the recordings."
+    )
 
 
 def weights_said(estimate: Estimate) -> str:

@@ -44,7 +44,7 @@ def widest(runs) -> tuple[float, float]:
 
 @pytest.mark.slow
 def test_a_joint_that_swings_within_the_band_is_found_there() -> None:
-    runs = virtual_runs("joint_elasticity:joint1:stiffness=20000")
+    runs = virtual_runs("joint_elasticity:joint1:stiffness=20000", seconds=(6.0, 7.0))
     bands = widest(runs)
     outcome = selected(runs, JointElasticity(), AsymmetricFriction(), bands=bands, free=True)
     assert found(outcome) == {"joint_elasticity of joint1"}

@@ -8,7 +8,8 @@ import pytest
 
 from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.diagnose import diagnose
-from scara_ident.diagnosis.tentative import tentative_effects
+from scara_ident.diagnosis.noise_check import BY_NOISE
+from scara_ident.diagnosis.tentative import LESS_NOISE, tentative_effects
 from scara_ident.effects.position import Spring
 from scara_ident.report.diagnosis import diagnosis_dict
 from scara_ident.robot.robot import load_robot
@@ -43,3 +44,12 @@ def test_it_stands_in_the_results_as_the_contract_says(doubtful):
 
 def test_what_is_believed_is_not_listed_again(doubtful):
     assert tentative_effects(doubtful.search, (), {("spring", "joint2")}) == ()
+
+
+@pytest.mark.parametrize("by_noise", [True, False])
+def test_what_noise_may_make_is_settled_by_less_of_it(doubtful, by_noise: bool):
+    """An elastic joint, of which noise made all, was to be settled by motions that show as much of the noise."""
+    (decision,) = (item.decision for item in doubtful.tentative)
+    why = f"{BY_NOISE if by_noise else 'chance'} makes it: with that taken off 0% of it is left, p = 6.1e-01"
+    (spring,) = tentative_effects(doubtful.search, [decision.refused(why)], ())
+    assert spring.settled_by == (LESS_NOISE if by_noise else Spring.experiment)

@@ -172,6 +172,20 @@ def test_the_payload_of_some_recordings_is_recovered():
     assert "negative" in str(effect.inadmissible(scene, member, -value, np.sqrt(np.diag(covariance))))
 
 
+@pytest.mark.parametrize(("inertia", "said"), [(0.048, "no body taken off"), (0.15, "carry less than the others")])
+def test_a_negative_mass_with_moments_of_no_body_is_not_said_to_be_carried_less(inertia: float, said: str):
+    """An Airbot's loaded run: -0.46 kg with a first moment of 0.24 kg m, 0.5 m off, and a moment of inertia of 0.048 kg m^2."""
+    robot, effect = load_robot(example_urdf("ur5_robot.urdf")), PayloadOfRecordings()
+    scene = scene_of(robot, start={"A_1": 0.0, "B_1": 0.0})
+    member = effect.in_recordings(scene, Member(None), frozenset(["B_1"]))
+    body = {"payload_m": -0.462, "payload_mz": 0.243, "payload_Ixx": -inertia, "payload_Iyy": -inertia}
+    size = {"payload_m": 0.058, "payload_mz": 0.017, "payload_Ixx": 0.005, "payload_Iyy": 0.005}
+    names = [column.name for column in effect.columns(scene, member)]
+    assert {*body} <= {*names}
+    value, std = (np.array([each.get(name, 0.001) for name in names]) for each in (body, size))
+    assert said in str(effect.inadmissible(scene, member, value, std))
+
+
 def test_no_arm_carries_more_than_it_weighs():
     scene = scene_of(load_robot())
     std = np.array([0.1])

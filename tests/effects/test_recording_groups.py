@@ -60,7 +60,8 @@ def test_what_is_known_to_be_bare_is_in_no_group(some: Scene):
     member = family.members(some)[0]
     assert family.description(some, member) == "a payload in r_1, r_2, r_4, not in the others"
     size = len(family.columns(some, member))
-    why = family.inadmissible(some, member, -np.ones(size), 0.1 * np.ones(size))
+    body, std = np.array([-1.0, *[-0.1] * (size - 1)]), 0.01 * np.ones(size)
+    why = family.inadmissible(some, member, body, std)
     assert why == "its mass would be negative: these recordings carry less than the others, or differ by no body"
 
 

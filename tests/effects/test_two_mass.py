@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+import weakref
 from dataclasses import replace
 
 import numpy as np
@@ -30,37 +32,36 @@ def alone(signals: Signals, joint: int, frequency: float, ratio: float) -> TwoMa
 
 @pytest.mark.parametrize("joint", [0, 1])
 def test_slopes_are_the_differences_of_the_torque_once_the_start_is_forgotten(joint: int):
-    scene, item = scene_of(load_robot()), moving(load_robot(), 4.0)
+    scene, item = scene_of(load_robot()), moving(load_robot(), 6.0)
     item = replace(item, torque=None)
 
     def scaled(value: Array, armature: float = 0.0, frequency: float = 4.5, ratio: float = 0.1) -> Array:
         other = replace(scene, value=value, armatures={0: scene.armatures[0] + armature})
         masses = alone(Signals(other, item), joint, frequency, ratio)
-        return (masses.stiffness * masses.change / stiffness)[:, 1000:]
+        return (masses.stiffness * masses.change / stiffness)[:, 2000:]
 
     stiffness = alone(Signals(scene, item), joint, 4.5, 0.1).stiffness
     bodies = len(scene.model.rigid_body.columns)
-    found = dense(alone(Signals(scene, item), joint, 4.5, 0.1).slopes(0), bodies + 3)[:, :, 1000:]
+    found = dense(alone(Signals(scene, item), joint, 4.5, 0.1).slopes(0), bodies + 3)[:, :, 2000:]
     for k in range(bodies):
         step = 1e-3 * np.eye(len(scene.value))[k]
         expected = (scaled(scene.value + step) - scaled(scene.value - step)) / 2e-3
-        assert np.abs(found[:, k] - expected).max() < 0.02 * np.abs(expected).max() + 1e-5 * np.abs(found).max()
+        assert np.abs(found[:, k] - expected).max() < 0.002 * np.abs(expected).max() + 1e-5 * np.abs(found).max()
     for k, (name, step) in enumerate((("armature", 1e-3), ("frequency", 1e-3), ("ratio", 1e-4))):
         if name == "armature" and scene.told_armature(joint) is not None:
             continue
         at = {"armature": 0.0, "frequency": 4.5, "ratio": 0.1}[name]
         expected = (scaled(scene.value, **{name: at + step}) - scaled(scene.value, **{name: at - step})) / (2.0 * step)
-        # Slopes are taken about no lag, and err by its size, here some hundredths of a radian.
-        assert np.abs(found[:, bodies + k] - expected).max() < 0.05 * np.abs(expected).max()
+        assert np.abs(found[:, bodies + k] - expected).max() < 0.002 * np.abs(expected).max()
 
 
-def swinging(stiffness: float, damping: float, start: float) -> tuple[Scene, Motion, Array]:
-    """The SCARA03 with an elastic second joint, its link integrated by Runge and Kutta; the link begins off by a swing."""
+def swinging(joint: int, stiffness: float, damping: float, start: float) -> tuple[Scene, Motion, Array]:
+    """The SCARA03 with one elastic joint, its link integrated by Runge and Kutta; the link begins off by a swing."""
     robot = load_robot()
     scene = scene_of(robot, name="basic")
     term = scene.model.rigid_body
     item = moving(robot, 4.0, rate=1.0 / STEP, seed=4)
-    rotor = scene.armature(1)
+    rotor = scene.armature(joint)
     value = scene.value[scene.model.place(term)]
     span, torque = item.time[-1], term.state_torque(value)
 
@@ -69,21 +70,21 @@ def swinging(stiffness: float, damping: float, start: float) -> tuple[Scene, Mot
 
     def rate(t: float, state: Array) -> Array:
         q, v, a = at(t, item.q), at(t, item.v), at(t, item.a)
-        spring = stiffness * (q[1] - state[0]) + damping * (v[1] - state[1])
-        q[1], v[1], a[1] = state[0], state[1], 0.0
-        still = torque(q, v, a)[1] / robot.row_scale[1]
-        a[1] = 1.0
-        inertia = torque(q, v, a)[1] / robot.row_scale[1] - still - rotor
+        spring = stiffness * (q[joint] - state[0]) + damping * (v[joint] - state[1])
+        q[joint], v[joint], a[joint] = state[0], state[1], 0.0
+        still = torque(q, v, a)[joint] / robot.row_scale[joint]
+        a[joint] = 1.0
+        inertia = torque(q, v, a)[joint] / robot.row_scale[joint] - still - rotor
         return np.array([state[1], (spring - still) / inertia])
 
-    first = np.array([item.q[1, 0] - start, item.v[1, 0]])
+    first = np.array([item.q[joint, 0] - start, item.v[joint, 0]])
     path = solve_ivp(rate, (0.0, span), first, t_eval=item.time, rtol=1e-7, atol=1e-9).y
     q, v, a = item.q.copy(), item.v.copy(), item.a.copy()
-    q[1], v[1] = path
-    a[1] = [rate(t, state)[1] for t, state in zip(item.time, path.T, strict=True)]
+    q[joint], v[joint] = path
+    a[joint] = [rate(t, state)[1] for t, state in zip(item.time, path.T, strict=True)]
     moved = Motion("m", "m", item.time, q, v, a, None, item.rate)
     change = term.torque(moved, value) - term.torque(item, value)
-    change[1] += robot.row_scale[1] * rotor * (item.a[1] - a[1])
+    change[joint] += robot.row_scale[joint] * rotor * (item.a[joint] - a[joint])
     return scene, replace(item, torque=Signals(scene, item).predicted + change), change
 
 
@@ -109,14 +110,20 @@ def test_slopes_are_the_differences_of_the_torque_where_its_first_samples_are_wr
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("frequency", "start"), [(3.0, 0.0), (9.0, 0.01)])
-def test_the_torque_is_that_of_a_two_mass_arm_by_runge_and_kutta(frequency: float, start: float):
+@pytest.mark.parametrize(
+    ("joint", "frequency", "ratio", "start"),
+    # Of the first joint the other folds the link, whose inertia then changes faster than so little damping.
+    [(1, 3.0, 0.04, 0.0), (1, 9.0, 0.04, 0.01), (0, 4.0, 0.01, 0.0)],
+)
+def test_the_torque_is_that_of_a_two_mass_arm_by_runge_and_kutta(
+    joint: int, frequency: float, ratio: float, start: float
+):
     scene = scene_of(load_robot(), name="basic", band=15.0)
-    masses = alone(Signals(scene, moving(load_robot())), 1, frequency, 0.04)
-    scene, item, change = swinging(masses.stiffness[0], masses.damping[0], start)
-    found = alone(Signals(scene, item), 1, frequency, 0.04).change
+    masses = alone(Signals(scene, moving(load_robot())), joint, frequency, ratio)
+    scene, item, change = swinging(joint, masses.stiffness[0], masses.damping[0], start)
+    found = alone(Signals(scene, item), joint, frequency, ratio).change
     inside = slice(100, -100)
-    assert np.abs(found - change)[:, inside].max() < 0.02 * np.abs(change)[:, inside].max()
+    assert np.abs(found - change)[:, inside].max() < 0.002 * np.abs(change)[:, inside].max()
 
 
 @pytest.mark.parametrize("frequency", [4.0, 40.0])
@@ -201,6 +208,19 @@ def test_what_each_link_adds_is_all_that_they_do_together():
         assert np.abs(sum(masses.parts) - masses.change).max() < 1e-9 * np.abs(change).max()
 
 
+@pytest.mark.parametrize("frequency", [4.0, 40.0])
+def test_what_members_share_goes_with_the_signals(frequency: float):
+    """With a small lag what was shared held the signals themselves: a search took three times the memory."""
+    item, member = moving(load_robot(), 2.0), Member(1, (frequency, 0.1))
+    scene = replace(scene_of(load_robot()), together=((JointElasticity(), member),))
+    signals = Signals(scene, item)
+    held = weakref.ref(signals)
+    assert len(list(TwoMasses(signals, (member,)).slopes(0))) == 2
+    del signals
+    gc.collect()
+    assert held() is None
+
+
 def test_an_estimate_of_no_arm_lets_nothing_grow():
     scene, item, _ = periodic(load_robot("ur5"), {0: 3000.0, 1: 3000.0})
     rng = np.random.default_rng(8)
@@ -234,7 +254,9 @@ def test_slopes_add_up_to_the_differences_of_what_all_links_do(recorded: bool):
     scene = scene_of(load_robot())
     members = members_with(scene, {0: 12000.0, 1: 2500.0})
     item = replace(item, torque=Signals(scene, item).predicted + whole if recorded else None)
-    inside = slice(60, -60) if recorded else slice(1000, None)
+    inside = slice(60, -60) if recorded else slice(2500, None)
+    # How links swung when the recording began is read about no lag.
+    near = 0.03 if recorded else 0.002
     bodies = len(scene.model.rigid_body.columns)
 
     def change(value: Array, members: tuple[Member, ...] = members, armature: float = 0.0) -> Array:
@@ -260,12 +282,11 @@ def test_slopes_add_up_to_the_differences_of_what_all_links_do(recorded: bool):
     for k in range(bodies):
         step = 1e-3 * np.eye(len(scene.value))[k]
         expected = (change(scene.value + step) - change(scene.value - step)) / 2e-3
-        assert norm(total[:, k, inside] - expected) < 0.05 * norm(expected) + 1e-5 * norm(total)
+        assert norm(total[:, k, inside] - expected) < near * norm(expected) + 1e-5 * norm(total)
     for place in range(2):
         for which, step in ((0, 1e-3), (1, 1e-4)):
             expected = change(scene.value, other(place, which, step)) - change(scene.value, other(place, which, -step))
             expected /= 2.0 * step
-            # Slopes are taken about no lag, and err by its size.
-            assert norm(own[place][:, 1 + which, inside] - expected) < 0.06 * norm(expected)
+            assert norm(own[place][:, 1 + which, inside] - expected) < near * norm(expected)
     expected = (change(scene.value, armature=1e-3) - change(scene.value, armature=-1e-3)) / 2e-3
-    assert norm(own[0][:, 0, inside] - expected) < 0.03 * norm(expected)
+    assert norm(own[0][:, 0, inside] - expected) < near * norm(expected)

@@ -13,7 +13,7 @@ from scara_ident.diagnosis.diagnose import diagnose
 from scara_ident.effects.presliding import dahl_state
 from scara_ident.estimation import Estimate, wls
 from scara_ident.estimation.run_offsets import beside_offsets
-from scara_ident.estimation.run_variation import KINDS, JointVariation, RunVariation
+from scara_ident.estimation.run_variation import KINDS, JointVariation, RunVariation, late_alike
 from scara_ident.estimation.variation_between import run_variation
 from scara_ident.paper import table5_parameters
 from scara_ident.recording.recording import Recording
@@ -118,6 +118,42 @@ def test_a_delay_that_all_runs_have_alike_is_no_difference():
     said, *others = variation.sentences(ROBOT)
     assert said.startswith("joint1 lags by 7.") and said.endswith(" ms in all runs alike")
     assert not any("delay" in item for item in others)
+
+
+@pytest.mark.parametrize(("count", "told"), [(3, False), (8, True)])
+def test_a_delay_alike_is_told_of_enough_runs(count: int, told: bool):
+    """`leads by 15 ms in all runs alike`, of three pieces of a chirp, whose delays scatter by a third of that."""
+    late = 0.012 + 0.004 * np.linspace(-1.0, 1.0, count)
+    delay = np.arange(4) == KINDS.index("delay")
+    bounds, nothing = np.arange(count + 1), np.zeros((count, 4))
+    item = JointVariation(np.ones((4, count)), 0.004 * delay, np.outer(late, delay), 0.01, bounds, nothing)
+    assert late_alike(item) == (pytest.approx(0.012) if told else 0.0)
+    (said,) = RunVariation((item, None)).sentences(ROBOT)
+    assert said == (
+        "joint1 lags by 12 ms in " + ("all runs alike" if told else "3 runs, which are too few to tell a delay")
+    )
+
+
+def test_pieces_of_one_recording_do_not_differ_by_a_delay():
+    """`effort comes late by another time in each run, on all joints alike`, of a chirp cut in three, which has one clock."""
+    (run,) = runs(np.random.default_rng(9), (0.0,) * 4, count=1, seconds=24.0)
+    # As of two clocks, of which another check tells.
+    late = np.array([np.interp(run.time - 0.08 * run.time / run.time[-1], run.time, row) for row in run.effort])
+    edges = np.linspace(0, len(run.time), 7).astype(int)
+    made = [
+        replace(
+            run,
+            name=f"{name}_1",
+            trajectory=name,
+            time=run.time[a:b],
+            position=run.position[:, a:b],
+            effort=late[:, a:b],
+        )
+        for name, a, b in zip("ABCDEF", edges[:-1], edges[1:], strict=True)
+    ]
+    variation = wls(observed(made)).variation
+    assert variation is not None and variation.delays is not None and not variation.delays.differ
+    assert not any("its delay" in item or "comes late" in item for item in variation.sentences(ROBOT))
 
 
 @pytest.mark.parametrize("apart", [0.0, 0.3])

@@ -107,3 +107,14 @@ def test_a_joint_without_torque_that_changes_takes_no_part():
     assert again is not None
     assert_allclose(again.of_run, found.of_run)
     assert shared_delays(products, aims, priors, np.zeros(JOINTS), 0, np.ones(JOINTS)) is None
+
+
+def test_pieces_of_one_recording_have_one_delay():
+    rng = np.random.default_rng(8)
+    late = np.array([0.0, 0.0, 0.0, 3.0, 3.0, 3.0])
+    products, aims, priors = told(late, rng=rng)
+    pieces = np.array([0, 0, 0, 3, 3, 3])
+    found = shared_delays(products, aims, priors, np.full(JOINTS, 1.0), 0, np.full(JOINTS, 0.5), pieces)
+    assert found is not None and found.differ
+    assert_allclose(found.of_run, np.repeat([-1.5, 1.5], 3), atol=0.2)
+    assert shared_delays(products, aims, priors, np.full(JOINTS, 1.0), 0, np.full(JOINTS, 0.5), 0 * pieces) is None

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.signal import butter, lfilter
 
 from scara_ident.errors import RecordingError
 from scara_ident.identification.identify import identify
@@ -18,6 +19,7 @@ from scara_ident.motion.position_noise import (
     noise_level,
     noise_sizes,
     noisier,
+    stamp_rounding,
     unresolved_joints,
 )
 from scara_ident.motion.prepared import prepare
@@ -109,6 +111,43 @@ def test_a_joint_that_swings_beyond_its_band_has_no_more_noise_for_it(counts: fl
     assert sizes == ((pytest.approx(step), pytest.approx(counts * step, rel=0.1)),) * 2
 
 
+def _ringing() -> np.ndarray:
+    """A swing of 60 Hz that dies away within a quarter of a second, begun anew every 0.8 s."""
+    since = np.mod(TIME, 0.8)
+    return 5e-4 * np.exp(-19.0 * since) * np.sin(2.0 * np.pi * 60.0 * since)
+
+
+@pytest.mark.parametrize("size", [0.0, 2e-6])
+def test_without_steps_what_is_quiet_at_times_is_no_noise(size: float):
+    rng = np.random.default_rng(6)
+    data = prepared(SMOOTH + _ringing() + size * rng.standard_normal(SMOOTH.shape))
+    ((sizes,),) = noise_sizes(data)
+    # Of a position without noise a fiftieth of what the swing was taken for.
+    rest = 0.02 * noise_level(data.stretches[0], 0) if size == 0.0 else 0.15 * size
+    assert [level for _, level in sizes] == pytest.approx([size, size], abs=rest)
+
+
+@given(share=st.floats(0.1, 0.3), order=st.integers(1, 2))
+@settings(max_examples=10, deadline=None)
+def test_filtered_noise_without_steps_stays_noise(share: float, order: int):
+    """It is not at the highest frequencies, as a swing is not; but it is there at all times."""
+    rng = np.random.default_rng(7)
+    noise = lfilter(*butter(order, 2.0 * share), 1e-4 * rng.standard_normal(SMOOTH.shape), axis=1)
+    data = prepared(SMOOTH + noise)
+    ((sizes,),) = noise_sizes(data)
+    for joint, (_, level) in enumerate(sizes):
+        assert level > 0.75 * noise_level(data.stretches[0], joint)
+
+
+def test_noise_that_grows_with_speed_stays_noise_where_it_is_white():
+    """As of stamps of few digits on an uneven clock: at the quietest there is little of it."""
+    rng = np.random.default_rng(8)
+    data = prepared(SMOOTH + 1e-4 * np.gradient(SMOOTH, TIME, axis=1) * rng.standard_normal(SMOOTH.shape))
+    ((sizes,),) = noise_sizes(data)
+    for joint, (_, level) in enumerate(sizes):
+        assert level > 0.85 * noise_level(data.stretches[0], joint)
+
+
 @pytest.mark.parametrize("band", [None, 0.13])
 def test_steps_are_added_where_the_band_is_so_wide_that_positions_keep_them(band: float | None):
     """Those of a hardly filtered position are no further noise: it was moved as a whole."""
@@ -168,3 +207,45 @@ def test_where_one_joint_shakes_with_more_torque_than_it_moves_with_none_is_reso
     found = unresolved_joints(data)
     assert set(found) == ({0, 1} if shaken else set())
     assert not shaken or "the torque of joint1 swings more beyond 40 Hz" in found[1]
+
+
+@pytest.mark.parametrize(("size", "shaken"), [(1.0, {0, 1}), (0.01, {0})])
+def test_a_joint_that_shakes_with_little_torque_shakes_no_other(size: float, shaken: set[int]):
+    """A TIAGo's wrist, that read 0.002 N m, was said to shake all seven joints and the torso, which had 0.3 N m and more."""
+    time = np.arange(1600) / 200.0
+    wave = np.sin(2.0 * np.pi * 57.0 * time)
+    motion = np.vstack([np.sin(1.3 * time), 0.5 * np.cos(2.1 * time)])
+    torque = np.vstack([size * (motion[0] + 3.0 * wave), 2.0 * motion[1]])
+    motion[0] -= 2e-3 * wave
+    data = prepare([recording(load_robot(), "M_1", time, motion, torque)], (25.0, 25.0))
+    assert set(unresolved_joints(data)) == shaken
+
+
+def _uneven(tick: float) -> np.ndarray:
+    """Times of an uneven clock of 125 samples a second, at whole ticks where there are any."""
+    interval = np.random.default_rng(9).uniform(0.6, 1.4, 1500) / 125.0
+    return np.cumsum(tick * np.round(interval / tick) if tick else interval)
+
+
+@pytest.mark.parametrize(("tick", "digits", "noisy"), [(0.0, 1e-3, True), (0.0, 1e-6, False), (2e-3, 1e-3, False)])
+def test_rounded_stamps_of_an_uneven_clock_are_noise_of_the_positions(tick: float, digits: float, noisy: bool):
+    """An arm without an elastic joint had two found: a spline through uneven samples hides half of the noise where it is measured."""
+    time = _uneven(tick)
+    position = np.vstack([np.sin(6.0 * time), 0.5 * np.cos(7.0 * time)])
+    stamps = digits * np.round(time / digits)
+    data = prepare([recording(load_robot(), "M_1", stamps, position, np.zeros_like(position))], (8.0, 8.0))
+    ((sizes,),) = noise_sizes(data)
+    speeds = np.array([6.0, 3.5]) / np.sqrt(2.0)
+    made = speeds * digits / np.sqrt(12.0)
+    for (_, level), size in zip(sizes, made, strict=True):
+        # Speed is the rms of moving samples.
+        assert level == pytest.approx(size, rel=0.1) if noisy else level < 0.2 * speeds[0] * 1e-3 / np.sqrt(12.0)
+
+
+def test_stamps_of_an_even_clock_are_not_rounded():
+    even = np.arange(1000) * 0.008
+    assert stamp_rounding(even) == 0.0
+    lost = np.delete(even, [100, 300, 301])
+    assert stamp_rounding(lost) == 0.0
+    assert stamp_rounding(1e-3 * np.round(_uneven(0.0) / 1e-3)) == pytest.approx(1e-3)
+    assert stamp_rounding(_uneven(0.0)) == 0.0

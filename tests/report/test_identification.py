@@ -11,7 +11,7 @@ import pytest
 from scara_ident.estimation import ConsistentOptions
 from scara_ident.estimation.run_variation import JointVariation, RunVariation
 from scara_ident.files import plain
-from scara_ident.report.identification import identification_dict, sentences
+from scara_ident.report.identification import below_zero_said, identification_dict, sentences
 from tests.report.simulated import made, run
 
 
@@ -168,3 +168,21 @@ def test_the_shape_of_friction_and_why_are_said():
 
 def test_notes_are_handed_on(result):
     assert identification_dict(replace(result, notes=("seen",)))["notes"] == ["seen"]
+
+
+@pytest.mark.parametrize(
+    ("stds", "said"), [(-1.5, "by no more than chance"), (-6.0, "by more than chance"), (1.0, None)]
+)
+def test_what_cannot_be_negative_is_said_to_be_so_by_chance_or_not(result, stds: float, said: str | None):
+    """Rotor inertias of a Panda of 6 standard deviations below zero were said to be of no real arm, and no more."""
+    estimate = result.estimate
+    value, std = np.abs(estimate.value), estimate.std
+    coulomb = estimate.model.names.index("a01")
+    value[coulomb] = stds * std[coulomb]
+    found = below_zero_said(replace(estimate, value=value))
+    if said is None:
+        assert found is None
+        return
+    assert found is not None and said in found and f"a01 by {-stds:.2g} standard deviations" in found
+    changed = replace(result, estimate=replace(estimate, value=value))
+    assert found in sentences(changed)
