@@ -163,7 +163,10 @@ def search(task: SearchTask, columns: CandidateColumns, *, known: Search | None 
     observations = columns.observations
     start = wls(observations)
     scene = scene_of(task.model, start.value, observations)
-    everything = [Candidate(effect, member) for effect in task.catalogue for member in effect.members(scene)]
+    differ = start.variation is not None and start.variation.delays is not None
+    # What each recording has of its own is a column for each: none is made where no joint shows that they differ.
+    families = [effect for effect in task.catalogue if differ or not effect.of_each_recording]
+    everything = [Candidate(effect, member) for effect in families for member in effect.members(scene)]
     pool = tuple(dict.fromkeys([*everything, *([] if known is None else _beginnings(known))]))
     candidates = () if columns.unresolved_for(None) is not None else pool
     task.progress(f"making the columns of {len(candidates)} candidates", 0.0)

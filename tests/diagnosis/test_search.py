@@ -19,6 +19,7 @@ from scara_ident.effects import Coefficient, Member
 from scara_ident.effects.friction import AsymmetricFriction, Stribeck
 from scara_ident.effects.measurement import TimeDelay, shifted
 from scara_ident.effects.position import Spring
+from scara_ident.effects.recording_delays import DelayOfEachRecording
 from scara_ident.estimation import wls
 from scara_ident.estimation.run_offsets import rms_of
 from tests.diagnosis.made import (
@@ -52,6 +53,12 @@ def test_nothing_comes_in_where_nothing_is_missing():
     assert result.model is result.scene.model
     assert not any(decision.accepted for decision in result.decisions)
     assert result.tried == len(result.decisions)
+
+
+def test_each_recording_has_a_column_of_its_own_only_where_joints_show_that_they_differ():
+    assert searched(exact_runs(), DelayOfEachRecording()).decisions == ()
+    late = [shifted(run, -delay) for run, delay in zip(exact_runs(), (0.0, 4e-3, 0.0, 4e-3), strict=True)]
+    assert len(searched(late, DelayOfEachRecording()).decisions) == 1
 
 
 def test_two_planted_effects_come_in_and_nothing_else():
