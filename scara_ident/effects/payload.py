@@ -313,7 +313,7 @@ def _short_of_body(shown: Sequence[int], value: Array, std: Array) -> bool:
     """Whether moments of inertia are clearly less than a mass with such first moments has by lying off the axis (Steiner)."""
     place = {k: at for at, k in enumerate(shown)}
     for inertia, across in ((4, (2, 3)), (6, (1, 3)), (9, (1, 2))):
-        if inertia not in place or 0 not in place:
+        if not {0, inertia} <= place.keys():
             continue
         (mass, own), (of_mass, of_own) = ([each[place[0]], each[place[inertia]]] for each in (value, std))
         moments = np.array([[value[place[k]], std[place[k]]] for k in across if k in place]).reshape(-1, 2)

@@ -31,7 +31,7 @@ def elastic_runs(first: int, second: int) -> tuple[Recording, ...]:
     arm = replace(virtual_arm(), torque_noise=np.array(NOISE))
     effects = [parse_effect(f"joint_elasticity:joint{j}:stiffness={k}") for j, k in ((1, first), (2, second))]
     return tuple(
-        simulate(arm, multisine(f"F{k}", k, 9.0), effects=effects, seed=k, rate=500.0).recording for k in (1, 2, 3)
+        simulate(arm, multisine(f"F{k}", k, 9.0), effects=effects, seed=k, rate=250.0).recording for k in (1, 2, 3)
     )
 
 

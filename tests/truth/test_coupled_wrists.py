@@ -16,11 +16,11 @@ SHAFT = {"inertia": 0.08, "viscous": 0.6, "coulomb": 0.7}
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("side", [1.0, -1.0])
-def test_a_shaft_through_two_wrists_is_found_with_its_three_parameters(side: float):
+def test_a_shaft_through_two_wrists_is_found_with_its_three_parameters():
     """Before there was such an effect two couplings of friction and one of inertia were named."""
     robot = load_robot("ur5")
     places = [robot.joints.index(name) for name in WRISTS]
+    side = -1.0
     arms = np.array([[1.0], [side]])
 
     def shaft(t: Array, q: Array, v: Array, a: Array, load: Array) -> Array:
