@@ -8,7 +8,7 @@ The model's columns are made orthonormal by the triangular factor of all rows, Z
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -169,6 +169,12 @@ class FittedModel:
         parts = zip(self.basis_blocks, self.residual, self.in_blocks, strict=True)
         found = [np.einsum("bmr,bm->br", basis, _by_block(error, places)) for basis, error, places in parts]
         return np.asarray(np.sum(found, axis=0))
+
+    def with_folds(self, fold: NDArray[np.intp]) -> FittedModel:
+        """Return the same model with other folds, and with all that was made of it: nothing that is kept depends on them."""
+        other = replace(self, fold=fold)
+        other.__dict__.update({name: made for name, made in self.__dict__.items() if name not in other.__dict__})
+        return other
 
     @property
     def folds(self) -> int:

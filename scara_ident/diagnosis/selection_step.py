@@ -89,7 +89,7 @@ class SelectionStep:
         owner = self.model.owner
         count = np.bincount(owner)[owner]
         place = np.arange(len(owner)) - np.searchsorted(owner, owner)
-        return replace(self.model, fold=place * self.criteria.parts // count)
+        return self.model.with_folds(place * self.criteria.parts // count)
 
     @property
     def offsets(self) -> RunVariation | None:
@@ -149,14 +149,10 @@ class SelectionStep:
         """
         own = [item for item in candidates if item.effect.of_each_recording]
         if own and model is None:
-            # The others in their order, and each of these where it stood.
-            timed, others = (
-                iter(self.judge(items, first, each))
-                for items, each in (
-                    (own, self.in_parts),
-                    ([item for item in candidates if not item.effect.of_each_recording], self.model),
-                )
-            )
+            # The others first, since what they make of the model serves both; then all in their order.
+            plain = [item for item in candidates if not item.effect.of_each_recording]
+            others = iter(self.judge(plain, first, self.model))
+            timed = iter(self.judge(own, first, self.in_parts))
             return [next(timed if item.effect.of_each_recording else others) for item in candidates]
         model = self.model if model is None else model
         rows = self.rows(self.scene, candidates) if first is None else self.rows_at_hand(first, candidates)

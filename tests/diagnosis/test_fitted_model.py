@@ -94,3 +94,16 @@ def test_few_signals_are_solved_for_as_many_are_multiplied_by_the_inverse(shared
     wanted = np.einsum("gbkr,brs->gbks", signals, model.released)
     assert_allclose(few, wanted, rtol=0, atol=1e-12 * np.max(np.abs(wanted)))
     assert_allclose(model.reaching(signals), wanted, rtol=0, atol=1e-12 * np.max(np.abs(wanted)))
+
+
+def test_with_other_folds_nothing_is_made_again():
+    model, candidates = uneven_blocks(0)
+    found = products_of(model, candidates[:1])
+    other = model.with_folds(model.fold // 2)
+    assert other.folds == 2
+    assert model.folds == 4
+    kept = [name for name in vars(model) if name not in ("fold",)]
+    assert "root" in kept
+    assert all(getattr(other, name) is getattr(model, name) for name in kept)
+    again = products_of(other, candidates[:1])
+    assert_allclose(again.scores, found.scores, rtol=0, atol=0)
