@@ -352,8 +352,9 @@ def _definite(inertia: Array) -> Array:
     if len(inertia) == 1:
         return inertia
     size = np.sqrt(np.einsum("iin->in", inertia))
-    scaled = np.moveaxis(inertia / (size[:, None] * size), 2, 0)
-    least = np.linalg.eigvalsh(scaled)[:, 0]
+    scaled = inertia / (size[:, None] * size)
+    # Of two the diagonal is 1 and what they share lies beside it.
+    least = 1.0 - np.abs(scaled[1, 0]) if len(size) == 2 else np.linalg.eigvalsh(np.moveaxis(scaled, 2, 0))[:, 0]
     factor = np.where(least < LEAST_EIGENVALUE, (1.0 - LEAST_EIGENVALUE) / (1.0 - np.minimum(least, 0.5)), 1.0)
     result = inertia * factor
     for a in range(len(inertia)):
