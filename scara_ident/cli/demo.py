@@ -99,9 +99,10 @@ def _record_fleet(folder: Path, seed: int) -> None:
     from scara_ident.simulation.named import named_motion
 
     arm, loss = virtual_arm(), parse_effect(HIDDEN)
+    motions = [named_motion(name, arm.robot) for name in ("OJD", "OJK", "CI")]
     for place, name in enumerate(ARMS):
         for k, day in enumerate(DAYS):
             effects = [loss] if name == CHANGED and day == DAYS[-1] else []
-            for motion in ("OJD", "OJK", "CI"):
-                done = simulate(arm, named_motion(motion, arm.robot), effects=effects, seed=100 * seed + 10 * place + k)
+            for motion in motions:
+                done = simulate(arm, motion, effects=effects, seed=100 * seed + 10 * place + k)
                 write_simulation(done, folder / name / day)

@@ -129,6 +129,9 @@ def _t(matrices: Array) -> Array:
 
 def power(matrices: Array, power: float) -> Array:
     """Return powers of symmetric matrices, zero in directions that they do not have."""
+    if matrices.shape[-1] == 1:
+        kept = matrices > 1e-12 * np.finfo(float).tiny
+        return np.where(kept, np.where(kept, matrices, 1.0) ** power, 0.0)
     values, vectors = np.linalg.eigh(matrices)
     kept = values > 1e-12 * np.maximum(values[..., -1:], np.finfo(float).tiny)
     raised = np.where(kept, np.where(kept, values, 1.0) ** power, 0.0)

@@ -21,10 +21,10 @@ from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.effects import CATALOGUE
 from scara_ident.effects.aliases import HIDDEN
 from scara_ident.model.base_parameters import find_base_parameters
-from scara_ident.paper import OJD
+from scara_ident.paper import OJD, OJK
 from scara_ident.recording.recording import write_recording
 from scara_ident.robot.robot import embedded_urdf, load_robot
-from scara_ident.simulation import sampled, simulate, virtual_arm
+from scara_ident.simulation import parse_effect, sampled, simulate, virtual_arm
 from tests.docs.pages import PAGES, Block, blocks, commands_in, not_printed, run, run_bash
 from tests.shared import ROOT
 from tests.test_layers import ROOMS
@@ -129,15 +129,25 @@ def test_a_known_payload_gives_the_torque_constant(reader: Path) -> None:
 def test_what_the_readme_says_to_type_runs(reader: Path) -> None:
     # The reader's own arm and log, by the names that the README gives them.
     shutil.copy(embedded_urdf(), reader / "my_arm.urdf")
-    arm = virtual_arm()
-    log = simulate(arm, sampled("OJD", arm.robot, OJD.motion, 12.0), rate=250.0).recording
+    arm, spring = virtual_arm(), parse_effect("spring:joint1:stiffness=0.045")
+    log, another, held_out = (
+        simulate(arm, sampled(motion.name, arm.robot, motion.motion, seconds), effects=[spring], seed=seed, rate=250.0)
+        for motion, seconds, seed in ((OJD, 12.0, 1), (OJK, 12.0, 2), (OJK, 8.0, 3))
+    )
     (reader / "logs").mkdir()
-    write_recording(log, reader / "logs" / "run_1.csv")
+    write_recording(log.recording, reader / "logs" / "run_1.csv")
     # The recordings are made before the block in which they are first used.
-    first, second, *_ = blocks(README)
+    first, second, *rest = blocks(README)
     assert first.prompted.startswith("scara-ident diagnose")
     run_bash("README.md", second.text, reader)
-    run(README, reader, done=[second])
+    run(README, reader, done=[second, *rest])
+    # From there on they are the reader's own, and shorter.
+    for folder, runs in (("train", [log, another]), ("test", [held_out])):
+        shutil.rmtree(reader / folder)
+        (reader / folder).mkdir()
+        for item in runs:
+            write_recording(item.recording, reader / folder / f"{item.recording.name}.parquet")
+    run(README, reader, done=[first, second])
     assert (reader / "out" / "identify" / "scara03_identified.urdf").is_file()
 
 

@@ -143,27 +143,29 @@ def test_ten_recordings_of_25_s_load_whole_and_keep_their_peak(big, opened):
 
 def test_dark_light_and_print_differ_in_colours_only(identified, opened):
     background = "getComputedStyle(document.body).backgroundColor"
-    light, dark = opened(identified, color_scheme="light"), opened(identified, color_scheme="dark")
-    assert light.evaluate(background) == "rgb(255, 255, 255)"
-    assert dark.evaluate(background) == "rgb(20, 23, 27)"
-    dark.locator("#theme").click()
-    assert dark.evaluate(background) == "rgb(255, 255, 255)"
-    dark.locator("#theme").click()
-    assert dark.evaluate(background) == "rgb(20, 23, 27)"
-    dark.emulate_media(media="print")
-    assert dark.evaluate(background) == "rgb(255, 255, 255)"
-    assert not dark.locator("nav").is_visible()
+    page = opened(identified, color_scheme="light")
+    assert page.evaluate(background) == "rgb(255, 255, 255)"
+    page.emulate_media(color_scheme="dark")
+    assert page.evaluate(background) == "rgb(20, 23, 27)"
+    page.locator("#theme").click()
+    assert page.evaluate(background) == "rgb(255, 255, 255)"
+    page.locator("#theme").click()
+    assert page.evaluate(background) == "rgb(20, 23, 27)"
+    page.emulate_media(media="print")
+    assert page.evaluate(background) == "rgb(255, 255, 255)"
+    assert not page.locator("nav").is_visible()
 
 
 def test_all_sections_are_named_beside_the_button_whatever_the_width(diagnosed, opened):
+    page = opened(diagnosed, viewport={"width": 1920, "height": 900})
+    bar = page.locator("nav div")
+    # As many as a page of all sections has.
+    bar.evaluate("bar => { while (bar.children.length < 12) bar.prepend(bar.querySelector('a').cloneNode(true)); }")
     for width in (1920, 1300, 800, 560):
-        page = opened(diagnosed, viewport={"width": width, "height": 900})
-        bar = page.locator("nav div")
-        # As many as a page of all sections has.
-        bar.evaluate("bar => { while (bar.children.length < 12) bar.prepend(bar.querySelector('a').cloneNode(true)); }")
+        page.set_viewport_size({"width": width, "height": 900})
         assert bar.evaluate("bar => bar.scrollWidth <= bar.clientWidth")
         button = page.locator("#theme").bounding_box()
-        right = [link.bounding_box() for link in page.locator("nav a").all()]
+        right = page.eval_on_selector_all("nav a", "links => links.map((link) => link.getBoundingClientRect().toJSON())")
         assert max(box["x"] + box["width"] for box in right) < button["x"]
         assert button["x"] + button["width"] <= width
 
