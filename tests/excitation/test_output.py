@@ -13,6 +13,7 @@ from scara_ident.excitation import (
     Effort,
     design_excitation,
     excitation_dict,
+    limits_of,
     write_joint_trajectory,
     write_trajectory,
 )
@@ -67,7 +68,8 @@ def test_rotors_that_nobody_stated_are_named_with_what_they_would_make_of_a_torq
     """They are most of what a geared joint moves: limits were said to hold with a third of the torque that was then asked for."""
     model = build_model(load_robot("ur5"), "basic")
     effort = Effort(starts=1, rounds=0, processes=1)
-    made = design_excitation(model, duration=4.0, harmonics=3, samples=200, effort=effort)
+    limits = limits_of(model.robot, clearance=None)
+    made = design_excitation(model, duration=4.0, harmonics=3, samples=200, limits=limits, effort=effort)
     (said,) = (line for line in notes(made) if line.startswith("Torques"))
     assert "without the rotors of shoulder_pan_joint, " in said
     worst = re.search(r"they would take (\w+) to some (\S+) N m of (\S+)\), without friction", said)
