@@ -61,7 +61,7 @@ def tool_frame(robot: Robot, link: str | None = None) -> pin.Frame:
 
 def force_torques(robot: Robot, configurations: Iterable[Array]) -> Iterator[Array]:
     """Give what a unit of each force on the tool, base frame, is at the joints, recorded side, shape (n, 3): ``J.T``."""
-    return (each[..., 0] for each in leaning_torques(robot, configurations))
+    return (jacobian[:3].T for jacobian, _ in _tool_jacobians(robot, configurations))
 
 
 def leaning_torques(robot: Robot, configurations: Iterable[Array]) -> Iterator[Array]:
@@ -69,14 +69,19 @@ def leaning_torques(robot: Robot, configurations: Iterable[Array]) -> Iterator[A
 
     The last axis is for a force on the tool, and what a metre more along each axis of the tool's frame adds to that.
     """
+    for jacobian, rotation in _tool_jacobians(robot, configurations):
+        moved = np.cross(jacobian[3:].T[:, None, :], rotation.T)
+        yield np.concatenate([jacobian[:3].T[..., None], moved.swapaxes(1, 2)], axis=2)
+
+
+def _tool_jacobians(robot: Robot, configurations: Iterable[Array]) -> Iterator[tuple[Array, Array]]:
+    """Give the Jacobian of the tool, base frame, recorded side, shape (6, n), and the rotation of its frame, (3, 3)."""
     frame = robot.model.getFrameId(tool_frame(robot).name, pin.FrameType.BODY)
     data = robot.model.createData()
     for q in configurations:
         jacobian = pin.computeFrameJacobian(robot.model, data, q, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
         # Of a single joint it comes as a vector.
-        both = jacobian.reshape(6, -1)[:, robot.order] * robot.row_scale
-        moved = np.cross(both[3:].T[:, None, :], data.oMf[frame].rotation.T)
-        yield np.concatenate([both[:3].T[..., None], moved.swapaxes(1, 2)], axis=2)
+        yield jacobian.reshape(6, -1)[:, robot.order] * robot.row_scale, data.oMf[frame].rotation
 
 
 def tool_placement(robot: Robot) -> tuple[Array, Array]:

@@ -56,9 +56,11 @@ def mujoco_arm(model: IdentifiedModel) -> Iterator[Free]:
         data.qpos[places], data.qvel[speeds] = q, v
         found = np.empty_like(torque)
         found[:, 0] = q
-        for k in range(torque.shape[1] - 1):
-            for part in (np.arange(steps) + 0.5) / steps:
-                data.ctrl[drives] = torque[:, k] + part * (torque[:, k + 1] - torque[:, k])
+        first, change = torque.T[:-1, None], np.diff(torque).T[:, None]
+        held = first + ((np.arange(steps) + 0.5) / steps)[:, None] * change
+        for k, controls in enumerate(held):
+            for control in controls:
+                data.ctrl[drives] = control
                 mujoco.mj_step(plant, data)
             found[:, k + 1] = data.qpos[places]
         # MuJoCo starts anew where it diverges.

@@ -1,6 +1,8 @@
 """The code blocks of a page, run as a reader would, in order, in one folder, and what they print beside what it shows.
 
-- ``bash`` and ``python`` are run; so are lines of a ``text`` block that begin with ``$``.
+- ``bash`` and ``python`` are run; so are lines of a ``text`` block that begin with ``$``. Where a ``bash``
+  block holds nothing but the program and its words they are run in this process, which has loaded what each would load anew;
+  all else is run by the shell.
 - ``text`` is what the block before it prints, or these lines do, or a part of that.
 - ``sh`` is only read: commands for data or places that a test does not have.
 - A block with a title is a file.
@@ -15,11 +17,12 @@ import shlex
 import subprocess
 import sys
 from collections.abc import Sequence
-from contextlib import redirect_stdout
+from contextlib import chdir, redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from scara_ident.cli.main import run as run_program
 from tests.shared import PATIENCE, ROOT
 
 PAGES = (ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md")))
@@ -28,6 +31,8 @@ _BLOCK = re.compile(r"^```(?P<head>[^\n]*)\n(?P<text>.*?)^```[ \t]*$", re.DOTALL
 _TITLE = re.compile(r'title="([^"]+)"')
 # A command behind a prompt, with the lines that a backslash joins to it.
 _PROMPTED = re.compile(r"^\$ ((?:\\\n|[^\n])*)", re.MULTILINE)
+# What a shell does more with than to part words.
+_SHELL = re.compile(r"[$*?~\[{|&;<>()`!]")
 # Not the digit of a name such as joint1 or P_d1.
 _NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 
@@ -78,7 +83,7 @@ def run(page: Path, folder: Path, done: Sequence[Block] = ()) -> dict[str, Any]:
         if block.title is not None:
             (folder / block.title).write_text(block.text, encoding="utf-8")
         elif block.language == "bash":
-            printed = run_bash(where, block.text, folder)
+            printed = run_here(where, block.text, folder)
         elif block.language == "python":
             # So that a traceback names the page and its line.
             code = compile("\n" * (block.line - 1) + block.text, str(page), "exec")
@@ -91,6 +96,19 @@ def run(page: Path, folder: Path, done: Sequence[Block] = ()) -> dict[str, Any]:
             missing = not_printed(block.shown, printed)
             assert missing is None, f"{where}: {missing!r} is not printed; this is:\n{printed}"
     return names
+
+
+def run_here(where: str, commands: str, folder: Path) -> str:
+    """Run commands as `run_bash`, in this process where each is one of the program and a shell only parts its words."""
+    each = [shlex.split(line, comments=True) for line in commands.replace("\\\n", " ").splitlines()]
+    if _SHELL.search(commands) or any(words[:1] not in ([], ["scara-ident"]) for words in each):
+        return run_bash(where, commands, folder)
+    with chdir(folder), redirect_stdout(io.StringIO()) as out, redirect_stderr(io.StringIO()) as told:
+        for words in filter(None, each):
+            status = run_program(words[1:])
+            assert status == 0, f"{where}: exit status {status}\n{out.getvalue()}{told.getvalue()}"
+    assert told.getvalue() == "", f"{where}:\n{told.getvalue()}"
+    return out.getvalue()
 
 
 def run_bash(where: str, commands: str, folder: Path) -> str:

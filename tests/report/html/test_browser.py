@@ -165,7 +165,9 @@ def test_all_sections_are_named_beside_the_button_whatever_the_width(diagnosed, 
         page.set_viewport_size({"width": width, "height": 900})
         assert bar.evaluate("bar => bar.scrollWidth <= bar.clientWidth")
         button = page.locator("#theme").bounding_box()
-        right = page.eval_on_selector_all("nav a", "links => links.map((link) => link.getBoundingClientRect().toJSON())")
+        right = page.eval_on_selector_all(
+            "nav a", "links => links.map((link) => link.getBoundingClientRect().toJSON())"
+        )
         assert max(box["x"] + box["width"] for box in right) < button["x"]
         assert button["x"] + button["width"] <= width
 
