@@ -1,7 +1,7 @@
 """The code blocks of a page, run as a reader would, in order, in one folder, and what they print beside what it shows.
 
 - ``bash`` and ``python`` are run; so are lines of a ``text`` block that begin with ``$``. Where a ``bash``
-  block holds nothing but the program and its words they are run in this process, which has loaded what each would load anew;
+  block holds nothing but the program, its words and files for what it prints they are run in this process, which has loaded what each would load anew;
   all else is run by the shell.
 - ``text`` is what the block before it prints, or these lines do, or a part of that.
 - ``sh`` is only read: commands for data or places that a test does not have.
@@ -32,7 +32,7 @@ _TITLE = re.compile(r'title="([^"]+)"')
 # A command behind a prompt, with the lines that a backslash joins to it.
 _PROMPTED = re.compile(r"^\$ ((?:\\\n|[^\n])*)", re.MULTILINE)
 # What a shell does more with than to part words.
-_SHELL = re.compile(r"[$*?~\[{|&;<>()`!]")
+_SHELL = re.compile(r"[$*?~\[{|&;<()`!]")
 # Not the digit of a name such as joint1 or P_d1.
 _NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 
@@ -99,16 +99,21 @@ def run(page: Path, folder: Path, done: Sequence[Block] = ()) -> dict[str, Any]:
 
 
 def run_here(where: str, commands: str, folder: Path) -> str:
-    """Run commands as `run_bash`, in this process where each is one of the program and a shell only parts its words."""
-    each = [shlex.split(line, comments=True) for line in commands.replace("\\\n", " ").splitlines()]
-    if _SHELL.search(commands) or any(words[:1] not in ([], ["scara-ident"]) for words in each):
+    """Run commands as `run_bash`, in this process where each is one of the program and a shell would only part its words."""
+    lines = [shlex.split(line, comments=True) for line in commands.replace("\\\n", " ").splitlines()]
+    # The last word may be a file for what is printed.
+    each = [(words[:-2], words[-1:]) if words[-2:-1] == [">"] else (words, []) for words in lines if words]
+    if _SHELL.search(commands) or any(words[0] != "scara-ident" or ">" in "".join(words) for words, _ in each):
         return run_bash(where, commands, folder)
-    with chdir(folder), redirect_stdout(io.StringIO()) as out, redirect_stderr(io.StringIO()) as told:
-        for words in filter(None, each):
+    printed = ""
+    for words, file in each:
+        with chdir(folder), redirect_stdout(io.StringIO()) as out, redirect_stderr(io.StringIO()) as told:
             status = run_program(words[1:])
-            assert status == 0, f"{where}: exit status {status}\n{out.getvalue()}{told.getvalue()}"
-    assert told.getvalue() == "", f"{where}:\n{told.getvalue()}"
-    return out.getvalue()
+        assert (status, told.getvalue()) == (0, ""), f"{where}: status {status}\n{out.getvalue()}{told.getvalue()}"
+        for name in file:
+            (folder / name).write_text(out.getvalue(), encoding="utf-8")
+        printed += "" if file else out.getvalue()
+    return printed
 
 
 def run_bash(where: str, commands: str, folder: Path) -> str:

@@ -25,7 +25,7 @@ from scara_ident.paper import OJD, OJK
 from scara_ident.recording.recording import write_recording
 from scara_ident.robot.robot import embedded_urdf, load_robot
 from scara_ident.simulation import parse_effect, sampled, simulate, virtual_arm
-from tests.docs.pages import PAGES, Block, blocks, commands_in, not_printed, run, run_bash
+from tests.docs.pages import PAGES, Block, blocks, commands_in, not_printed, run, run_bash, run_here
 from tests.shared import ROOT
 from tests.test_layers import ROOMS
 
@@ -167,6 +167,10 @@ def test_what_is_printed_is_compared_with_what_is_shown() -> None:
 def test_a_block_that_fails_or_prints_something_else_is_a_failure(tmp_path: Path) -> None:
     with pytest.raises(AssertionError, match=r"docs/index\.md, line 7: exit status 2"):
         run_bash("docs/index.md, line 7", "scara-ident identfy\necho reached", tmp_path)
+    with pytest.raises(AssertionError, match=r"docs/index\.md, line 7: status 2"):
+        run_here("docs/index.md, line 7", "scara-ident identfy", tmp_path)
+    assert run_here("docs/index.md, line 7", "scara-ident base > base.txt  # to a file", tmp_path) == ""
+    assert "P_d1" in (tmp_path / "base.txt").read_text(encoding="utf-8")
     page = tmp_path / "page.md"
     page.write_text("```python\nprint(0.11)\n```\n\n```text\n0.21\n```\n", encoding="utf-8")
     with pytest.raises(AssertionError, match=r"page\.md, line 6: '0\.21' is not printed"):
