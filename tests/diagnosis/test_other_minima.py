@@ -11,7 +11,8 @@ import pytest
 
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.effect_parameters import physical_parameters
-from scara_ident.diagnosis.nonlinear_fit import linearise, tune
+from scara_ident.diagnosis.linearised import linearise
+from scara_ident.diagnosis.nonlinear_fit import tune
 from scara_ident.diagnosis.other_laws import parameters_of_laws
 from scara_ident.diagnosis.other_minima import as_good, lowest, widened
 from scara_ident.diagnosis.selection_step import SelectionStep
