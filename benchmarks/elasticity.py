@@ -25,7 +25,7 @@ from scara_ident.diagnosis.cluster_test import needed
 from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.diagnose import Diagnosis, diagnose
 from scara_ident.diagnosis.evidence import least_found
-from scara_ident.diagnosis.nonlinear_fit import STEPLESS, linearise
+from scara_ident.diagnosis.linearised import STEPLESS, linearise
 from scara_ident.diagnosis.selection_step import best_of_each
 from scara_ident.effects import EffectTerm, Member, Scene
 from scara_ident.effects.catalogue import effects_named

@@ -12,8 +12,9 @@ from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.correction import still_there, taken_out, told_beside
 from scara_ident.diagnosis.criteria import SelectionCriteria
 from scara_ident.diagnosis.effect_parameters import parameters_beside, told_size
+from scara_ident.diagnosis.linearised import freed_model
 from scara_ident.diagnosis.noise_check import noise_objection
-from scara_ident.diagnosis.nonlinear_fit import freed_model, tune
+from scara_ident.diagnosis.nonlinear_fit import tune
 from scara_ident.diagnosis.remainder_check import remainder_objection
 from scara_ident.diagnosis.selection_step import SelectionStep, best_of_each, points_of_lines
 from scara_ident.diagnosis.setpoints import setpoint_objection
@@ -50,7 +51,9 @@ def choose(
     beside = [item for item in first if item.candidate.effect.together and step.scene.together]
     best_gain = max((item.gain for item in accepted), default=0.0)
     found = fitted_beside(step, [item for item in first if item not in beside], best_gain, known)
-    found += _each_fitted(step, _promising(step, beside), beside, known) + _in_place_of_the_last(step, beside)
+    found += _least_left(
+        _each_fitted(step, _promising(step, beside), beside, known) + _in_place_of_the_last(step, beside)
+    )
     fitted = {item.label for _, item in found}
     refused = {item.label: item for _, item in found if not item.accepted}
     accepted += _sure_once_refined(step, best, max((item.examination.held_out for item in accepted), default=0.0))
@@ -167,9 +170,27 @@ def _each_fitted(
     return found
 
 
+def _least_left(found: Sequence[tuple[SelectionStep, Decision]]) -> list[tuple[SelectionStep, Decision]]:
+    """Return of several fits of the same effects the one that leaves the least, which the last gains by beside the others least.
+
+    Beside others in a wrong minimum it may gain all.
+    """
+    best: dict[frozenset[str], tuple[SelectionStep, Decision]] = {}
+    for own, decision in found:
+        effects = frozenset((*(item.label(own.scene) for item in own.chosen), decision.label))
+        held = best.get(effects)
+        if held is None or _left(decision) < _left(held[1]):
+            best[effects] = (own, decision)
+    return list(best.values())
+
+
+def _left(decision: Decision) -> float:
+    return float(np.sum(decision.examination.left))
+
+
 def _if_more(step: SelectionStep, decision: Decision) -> Decision:
     """Return a decision on what was fitted with the model of a step, refused where both leave as much as that alone."""
-    before, left = float(np.sum(step.model.squares)), float(np.sum(decision.examination.left))
+    before, left = float(np.sum(step.model.squares)), _left(decision)
     if decision.accepted and before - left < step.criteria.least_gain * before / step.scene.robot.n:
         return replace(decision, accepted=False, why="takes the place of an effect in the model")
     return decision

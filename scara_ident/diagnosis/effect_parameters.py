@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.candidate_tests import examine
 from scara_ident.diagnosis.candidates import Candidate, Rows
-from scara_ident.diagnosis.nonlinear_fit import Linearised, linearise, tune
+from scara_ident.diagnosis.linearised import Linearised, linearise
+from scara_ident.diagnosis.nonlinear_fit import tune
 from scara_ident.diagnosis.selection_step import SelectionStep
 from scara_ident.diagnosis.unknowns import sides
 from scara_ident.effects import Effect, Parameter, Scene

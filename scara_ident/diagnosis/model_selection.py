@@ -42,6 +42,7 @@ def select_model(task: SearchTask, observations: Observations, *, free: bool) ->
     data = observations.data
     now, left = first(task.progress)
     found, looked = search(replace(task, progress=now), CandidateColumns(observations)), False
+    narrower: Search | None = None
     for _ in range(criteria.most_widenings if free else 0):
         left("choosing the band again")
         # What was missing had hidden how far up the motion explains the torque, and other effects with it.
@@ -62,14 +63,21 @@ def select_model(task: SearchTask, observations: Observations, *, free: bool) ->
             # The motion says less of what is so far up, and there is nothing.
             break
         found.step.columns.leave()
+        # The motion says less of what is so far up.
+        narrower = found if promised > explains else None
         found = again
     left("testing what is left")
-    return _without_proxies(replace(task, progress=left), outcome_of(task, found))
+    outcome = _without_proxies(replace(task, progress=left), outcome_of(task, found))
+    if narrower is None or not narrower.chosen or _labels(outcome.search) != _labels(narrower):
+        return outcome
+    # What the wider band was for did not stand.
+    back = _without_proxies(replace(task, progress=left), outcome_of(task, narrower))
+    return replace(back, demoted=(*outcome.demoted, *back.demoted))
 
 
 def _promised_band(found: Search, criteria: SelectionCriteria) -> float:
     """Return the band that would tell effects that are not in the model and may be there, Hz; 0 where there are none."""
-    chosen = {item.label(found.scene) for item in found.chosen}
+    chosen = _labels(found)
     promising = [
         item
         for item in found.decisions
@@ -133,8 +141,12 @@ def _told(found: Search) -> float:
 
 def _new(found: Search, before: Search) -> bool:
     """Whether effects that need a wide band were found that were not before."""
-    labels = {item.label(before.scene) for item in before.chosen}
+    labels = _labels(before)
     return any(item.effect.band(item.member) > 0.0 and item.label(found.scene) not in labels for item in found.chosen)
+
+
+def _labels(found: Search) -> set[str]:
+    return {item.label(found.scene) for item in found.chosen}
 
 
 def _widest(data: PreparedData) -> float:

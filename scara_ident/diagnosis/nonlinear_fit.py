@@ -1,294 +1,27 @@
-"""Fitting the nonlinear parameters of all effects in a model together, by Gauss and Newton.
-
-Columns of an effect may follow from the bodies as strongly as from its own parameters, as an elastic joint's do. Such an
-effect is tied: it says what its coefficient is and what its torque changes by, and the columns of the bodies take that up.
-"""
+"""Fitting the nonlinear parameters of all effects in a model together, by steps of Gauss and Newton that may be held back."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.at_estimate import at_estimate, estimate_of, without_others
-from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, Rows, with_columns
-from scara_ident.diagnosis.fitted_model import FittedModel
+from scara_ident.diagnosis.linearised import Linearised, linearise, moved_candidate
 from scara_ident.diagnosis.selection_step import SelectionStep
-from scara_ident.diagnosis.unknowns import Unknown, unknowns_of
-from scara_ident.effects import Scene, Tie
-from scara_ident.estimation.information import Information, merge, weighted
-from scara_ident.estimation.joint_rows import JointRows
-from scara_ident.estimation.run_variation import RunVariation
-from scara_ident.threads import one_blas_thread, side_by_side
 
 # Steps of Gauss and Newton; most fits settle in three, and a search has further ones. A tied effect comes from far away.
 ROUNDS, TIED_ROUNDS = 6, 24
-# Standard deviations by which the last step may still move something: less is of no account.
+# Standard deviations: a step that is shorter for every parameter is the last.
 SETTLED = 0.1
 # A rise of the squared error by more than this share turns a step back; loads that settle may raise it by less.
 RISE = 1e-5
 # A step that lowers the squared error by a smaller share is the last of a coarse fit.
 LEAST_FALL = 0.03
-# Of a step no less than this share is tried.
-SHORTEST_SHARE = 0.01
-# Directions whose singular value, columns scaled to unit length, is below this share of the largest take no step.
-STEPLESS = 1e-9
-# A row that ties a coefficient is so many times as weighty as all rows that it acts on.
-TIGHTNESS = 1e3
-
-
-@dataclass(frozen=True, eq=False)
-class Linearised:
-    """A model with effects, linear in all its parameters about the present nonlinear ones.
-
-    Attributes
-    ----------
-    places : tuple of slice
-        Columns of each effect.
-    joints : tuple of JointRows
-        Columns of the base model, of the effects, and the change of the torque per unit of each nonlinear parameter.
-    information : Information
-        Of all weighted rows, with offsets of runs as noise; its parameters are k linear ones, then s nonlinear ones.
-    ties : Information
-        Rows that hold the coefficients of tied effects to what the nonlinear parameters and the rigid bodies say of them.
-    """
-
-    scene: Scene
-    chosen: tuple[Candidate, ...]
-    unknowns: tuple[Unknown, ...]
-    places: tuple[slice, ...]
-    joints: tuple[JointRows, ...]
-    information: Information
-    ties: Information
-
-    @property
-    def linear(self) -> int:
-        """Number of linear parameters k."""
-        return self.information.parameters - len(self.unknowns)
-
-    @cached_property
-    def value(self) -> Array:
-        """Linear parameters that fit best at the present nonlinear ones, shape (k,)."""
-        return _solved(self.information, self.ties, self.linear)
-
-    @cached_property
-    def rows(self) -> int:
-        """Number of rows."""
-        return sum(rows.table.shape[1] for rows in self.joints)
-
-    @cached_property
-    def variance(self) -> float:
-        """Mean squared residual of a weighted row."""
-        value = np.concatenate([self.value, np.zeros(len(self.unknowns))])
-        return self.information.residual_sum(value) / self.rows
-
-    @property
-    def error(self) -> float:
-        """Squared residual with what the priors add to it, the bodies as they were where effects follow from them."""
-        prior = sum(((item.value - item.nominal) / item.spread) ** 2 for item in self.unknowns)
-        left = self.variance * self.rows
-        if len(self.ties.factor):
-            value = np.concatenate([_solved(self.information, self._held, self.linear), np.zeros(len(self.unknowns))])
-            left = self.information.residual_sum(value)
-        return left + self.variance * prior
-
-    @property
-    def _held(self) -> Information:
-        """The ties, and rows that hold the rigid bodies to the present estimate."""
-        place = self.scene.model.place(self.scene.model.rigid_body)
-        size = np.linalg.norm(self.information.factor[:, place], axis=0)
-        rows = np.zeros((len(size), self.information.parameters + 1))
-        rows[:, place], rows[:, -1] = np.diag(size), size * self.scene.value[place]
-        return merge([self.ties, Information(TIGHTNESS * rows, 0.0)])
-
-    @property
-    def prior(self) -> Information:
-        """Rows of the priors on the nonlinear parameters, as weighty as measured rows."""
-        known = [k for k, item in enumerate(self.unknowns) if np.isfinite(item.spread)]
-        rows = np.zeros((len(known), self.information.parameters + 1))
-        for row, k in enumerate(known):
-            item = self.unknowns[k]
-            weight = np.sqrt(self.variance) / item.spread
-            rows[row, self.linear + k] = weight
-            rows[row, -1] = weight * (item.nominal - item.value)
-        return merge([Information(rows, 0.0), self.ties])
-
-    def solve(self) -> tuple[Array, Array]:
-        """Return the best parameters, nonlinear ones as a change, and the white standard deviations of all.
-
-        Those that would leave their bounds stay there, and all others are the best beside them.
-        """
-        best, std = self._solve(np.zeros(0, dtype=np.intp))
-        changes = best[self.linear :]
-        stuck = [item.moved(change) == item.value for item, change in zip(self.unknowns, changes, strict=True)]
-        return self._solve(self.linear + np.flatnonzero(stuck)) if any(stuck) else (best, std)
-
-    def _solve(self, held: NDArray[np.intp]) -> tuple[Array, Array]:
-        rows = np.vstack([self.information.factor, self.prior.factor])
-        columns, target = rows[:, :-1].copy(), rows[:, -1]
-        columns[:, held] = 0.0
-        size = np.linalg.norm(columns, axis=0)
-        size[size == 0.0] = 1.0
-        left, singular, right = np.linalg.svd(columns / size, full_matrices=False)
-        kept = singular > STEPLESS * singular[0]
-        half = right[kept].T / singular[kept]
-        best = half @ (left[:, kept].T @ target) / size
-        return best, np.sqrt(self.variance * np.sum(half**2, axis=1)) / size
-
-
-def linearise(step: SelectionStep) -> Linearised:
-    """Return the model of a step, linear about the present nonlinear parameters.
-
-    What offsets of runs make is noise, see `Estimate.offsets`.
-    """
-    scene, columns, chosen, weights = step.scene, step.columns, step.chosen, step.weights
-    observations = columns.observations
-    unknowns = unknowns_of(scene, chosen, step.criteria.rotor_inertia_std)
-    own = columns.rows(scene, chosen)
-    bounds = observations.parameters + np.cumsum([0, *(len(next(iter(rows.values()))) for rows in own)])
-    places = tuple(slice(int(a), int(b)) for a, b in zip(bounds[:-1], bounds[1:], strict=True))
-    joints = with_columns(observations, own)
-    linear, total = int(bounds[-1]), int(bounds[-1]) + len(unknowns)
-    slopes: dict[int, tuple[Array, ...]] = {}
-    ties = []
-    for owner, candidate in enumerate(chosen):
-        tie = candidate.effect.tie(scene, candidate.member)
-        if tie is not None:
-            slopes[owner] = columns.slopes(scene, candidate)
-            joints = _with_slopes(joints, slopes[owner], scene)
-            size = _size(joints, int(bounds[owner]), weights)
-            ties.append(TIGHTNESS * size * _tie_row(scene, chosen, unknowns, owner, tie, int(bounds[owner]), linear))
-    held = Information(np.array(ties).reshape(-1, total + 1), 0.0)
-    value = _solved(_pooled(joints, total, weights, step.offsets), held, linear)
-    changes = [_change(scene, columns, chosen, item, places, value, slopes) for item in unknowns]
-    extended = tuple(_beside(rows, joint, changes, linear) for joint, rows in enumerate(joints))
-    information = _pooled(extended, total, weights, step.offsets)
-    return Linearised(scene, chosen, unknowns, places, extended, information, held)
-
-
-def freed_model(step: SelectionStep) -> FittedModel:
-    """Return a fitted model in which nonlinear parameters may move with all others, as far as it is linear in them.
-
-    What takes up most of what is missing by a wrong value of them leaves nothing of it to candidates beside them as they are.
-    """
-    state = linearise(step)
-    return step.fitted(state.joints, state.information.parameters)
-
-
-def _solved(information: Information, ties: Information, linear: int) -> Array:
-    """Return the linear parameters that fit best where the nonlinear ones stay, ties kept."""
-    held = Information(ties.factor[:, [*range(linear), -1]], 0.0)
-    return merge([information.select(range(linear)), held]).solve().value
-
-
-def _with_slopes(joints: Sequence[JointRows], slopes: Sequence[Array], scene: Scene) -> tuple[JointRows, ...]:
-    """Return rows whose columns of the rigid bodies have what an effect's torque changes by with their parameters.
-
-    The torque has it too, at the present parameters, so that what is left stays what it is.
-    """
-    place = scene.model.place(scene.model.rigid_body)
-    found = []
-    for rows, all_slopes in zip(joints, slopes, strict=True):
-        own = all_slopes[: place.stop - place.start]
-        bodies = np.arange(place.start, place.stop)
-        missing = bodies[~np.isin(bodies, rows.columns) & np.any(own != 0.0, axis=1)]
-        places = np.concatenate([rows.columns, missing])
-        table = np.concatenate([rows.table[:-1], np.zeros((len(missing), rows.table.shape[1])), rows.table[-1:]])
-        inside = (places >= place.start) & (places < place.stop)
-        table[:-1][inside] += own[places[inside] - place.start]
-        table[-1] += scene.value[place] @ own
-        found.append(JointRows(places, table, rows.starts, rows.counts))
-    return tuple(found)
-
-
-def _tie_row(
-    scene: Scene,
-    chosen: Sequence[Candidate],
-    unknowns: Sequence[Unknown],
-    owner: int,
-    tie: Tie,
-    column: int,
-    linear: int,
-) -> Array:
-    """Return the row that ties an effect's coefficient, shape (k + s + 1,)."""
-    place = scene.model.place(scene.model.rigid_body)
-    by_bodies = tie.slopes[: place.stop - place.start]
-    row = np.zeros(linear + len(unknowns) + 1)
-    row[column] = 1.0
-    row[place] = -by_bodies
-    row[-1] = tie.value - by_bodies @ scene.value[place]
-    for k, item in enumerate(unknowns):
-        which, factor = _slope_of(scene, chosen, item, owner)
-        if which is not None:
-            row[linear + k] = -factor * tie.slopes[which]
-    return row
-
-
-def _slope_of(scene: Scene, chosen: Sequence[Candidate], item: Unknown, owner: int) -> tuple[int | None, float]:
-    """Return which of a tied effect's slopes is by a nonlinear parameter, and what to multiply it with."""
-    bodies = len(scene.model.rigid_body.columns)
-    if item.owner == owner:
-        return bodies + 1 + item.place, 1.0
-    if item.owner is None and chosen[owner].effect.geared_joint(chosen[owner].member) == item.place:
-        return bodies, scene.armature(item.place)
-    return None, 0.0
-
-
-def _size(joints: Sequence[JointRows], column: int, weights: Array) -> float:
-    """Return the weighted length of a column."""
-    parts = (rows.table[:-1][rows.columns == column] for rows in joints)
-    return float(np.linalg.norm([w * np.linalg.norm(part) for w, part in zip(weights, parts, strict=True)]))
-
-
-def _pooled(joints: Sequence[JointRows], parameters: int, weights: Array, offsets: RunVariation | None) -> Information:
-    joints = joints if offsets is None else offsets.whitened_rows(joints)
-    with one_blas_thread():
-        return weighted(side_by_side(lambda rows: rows.information(parameters), joints), weights)
-
-
-def _change(
-    scene: Scene,
-    columns: CandidateColumns,
-    chosen: Sequence[Candidate],
-    item: Unknown,
-    places: Sequence[slice],
-    value: Array,
-    slopes: Mapping[int, tuple[Array, ...]],
-) -> dict[int, Array]:
-    """Return the change of each joint's torque per unit of a nonlinear parameter, shape (N,)."""
-    total: dict[int, Array] = {}
-    for owner, place in enumerate(places):
-        if item.owner is not None and owner != item.owner:
-            continue
-        if owner in slopes:
-            which, factor = _slope_of(scene, chosen, item, owner)
-            if which is not None:
-                for joint, own in enumerate(slopes[owner]):
-                    total[joint] = total.get(joint, 0.0) + factor * own[which]
-            continue
-        sides: list[Rows] = []
-        for sign in (1.0, -1.0):
-            at = item.value + sign * item.step
-            if item.owner is None:
-                sides += columns.rows(_with_armature(scene, item.place, float(np.exp(at))), [chosen[owner]])
-            else:
-                sides += columns.rows(scene, [_moved_candidate(chosen[owner], item.place, at)])
-        for joint in sides[0]:
-            change = value[place] @ (sides[0][joint] - sides[1][joint]) / (2.0 * item.step)
-            total[joint] = total.get(joint, 0.0) + change
-    return total
-
-
-def _beside(rows: JointRows, joint: int, changes: Sequence[dict[int, Array]], first: int) -> JointRows:
-    acting = [k for k, change in enumerate(changes) if joint in change]
-    if not acting:
-        return rows
-    table = np.concatenate([rows.table[:-1], [changes[k][joint] for k in acting], rows.table[-1:]])
-    return JointRows(np.concatenate([rows.columns, [first + k for k in acting]]), table, rows.starts, rows.counts)
+# No step is tried that is held back more: it would be a hundredth as long as one that nothing holds.
+MOST_DAMPING = 100.0
 
 
 def tune(step: SelectionStep, *, coarse: bool = False) -> SelectionStep:
@@ -310,31 +43,51 @@ def tune(step: SelectionStep, *, coarse: bool = False) -> SelectionStep:
     step = replace(step, scene=without_others(step.scene, step.chosen))
     settling = _settling(step)
     best: Linearised | None = None
-    way, share, std = np.zeros(0), 1.0, np.zeros(0)
+    share, damping, turned_back = 1.0, 0.0, False
     tied = any(item.effect.tie(step.scene, item.member) is not None for item in step.chosen)
     for _ in range(TIED_ROUNDS if tied else ROUNDS):
         now = linearise(step)
-        if best is not None and now.error > (1.0 + RISE) * best.error:
-            share *= 0.5
-            if share < SHORTEST_SHARE:
+        before, turned_back = turned_back, best is not None and now.error > (1.0 + RISE) * best.error
+        if best is not None and turned_back:
+            # A step as long as half of the last, where that is not cut short.
+            damping = 2.0 * damping + 1.0
+            if damping > MOST_DAMPING:
                 break
-            step = _moved(step, best, way, share)
-            continue
-        moved = np.inf
-        if best is not None:
-            change = share * way[best.linear :]
-            past = np.concatenate([(now.value - best.value)[settling], change])
-            spread = np.concatenate([std[settling], std[best.linear :]])
-            moved = float(np.max(np.abs(past) / np.maximum(spread, np.finfo(float).tiny)))
-        arrived = coarse and best is not None and best.error - now.error < LEAST_FALL * best.error
-        best = now
-        if moved < SETTLED or arrived:
-            break
-        way, std = now.solve()
-        share = min([1.0, *(item.share(x) for item, x in zip(now.unknowns, way[now.linear :], strict=True))])
+            way = best.solve(damping)[0]
+        else:
+            # Where the way is longer than a step may be, how little one gains says nothing of the whole.
+            near = coarse and share == 1.0
+            arrived = near and best is not None and best.error - now.error < LEAST_FALL * best.error
+            best = now
+            way, std = now.solve()
+            if np.all(_to_go(now, way, settling) <= SETTLED * np.concatenate([std[settling], std[now.linear :]])):
+                if _share(now, way) < 1.0:
+                    break
+                # So short a step needs no look at where it leads.
+                step = _moved(step, now, way, 1.0)
+                return replace(step, scene=at_estimate(step.scene, step.chosen, way[: now.linear]))
+            if arrived:
+                break
+            # A longer one after two that went well: after one alone every other step would be turned back.
+            damping = damping if before else 0.5 * max(damping - 1.0, 0.0)
+            if damping:
+                way = now.solve(damping)[0]
+        share = _share(best, way)
         step = _moved(step, best, way, share)
     assert best is not None
     return replace(step, scene=at_estimate(best.scene, best.chosen, best.value), chosen=best.chosen)
+
+
+def _to_go(state: Linearised, way: Array, settling: NDArray[np.intp]) -> Array:
+    """Return how far a way leads: of the linear parameters that columns follow, then of the nonlinear ones."""
+    linear = way[: state.linear] - estimate_of(state.scene, state.chosen)
+    changes = zip(state.unknowns, way[state.linear :], strict=True)
+    return np.asarray(np.abs(np.concatenate([linear[settling], [item.moved(x) - item.value for item, x in changes]])))
+
+
+def _share(state: Linearised, way: Array) -> float:
+    """Return how much of a way may be gone at once."""
+    return min([1.0, *(item.share(x) for item, x in zip(state.unknowns, way[state.linear :], strict=True))])
 
 
 def _settling(step: SelectionStep) -> NDArray[np.intp]:
@@ -344,7 +97,7 @@ def _settling(step: SelectionStep) -> NDArray[np.intp]:
     loaded = any(item.effect.geared_joint(item.member) is not None for item in step.chosen)
     for item in step.chosen:
         start, stop = stop, stop + len(item.effect.columns(step.scene, item.member))
-        if loaded and item.effect.on_links:
+        if loaded and item.effect.on_links and item.effect.geared_joint(item.member) is None:
             places.append(np.arange(start, stop))
     return np.concatenate(places)
 
@@ -358,17 +111,7 @@ def _moved(step: SelectionStep, state: Linearised, way: Array, share: float) -> 
         if item.owner is None:
             armatures[item.place] = float(np.exp(value))
         else:
-            chosen[item.owner] = _moved_candidate(chosen[item.owner], item.place, value)
+            chosen[item.owner] = moved_candidate(chosen[item.owner], item.place, value)
     old = estimate_of(state.scene, state.chosen)
     scene = at_estimate(state.scene, chosen, old + share * (way[: len(old)] - old))
     return replace(step, scene=replace(scene, armatures=armatures), chosen=tuple(chosen))
-
-
-def _moved_candidate(candidate: Candidate, place: int, value: float) -> Candidate:
-    nonlinear = list(candidate.member.nonlinear)
-    nonlinear[place] = value
-    return candidate.at(nonlinear)
-
-
-def _with_armature(scene: Scene, joint: int, value: float) -> Scene:
-    return replace(scene, armatures={**scene.armatures, joint: value})

@@ -15,12 +15,16 @@ import numpy as np
 from scara_ident.diagnosis.candidates import Candidate, columns_at_hand
 from scara_ident.diagnosis.effect_parameters import physical_parameters
 from scara_ident.diagnosis.exchange import same
-from scara_ident.diagnosis.nonlinear_fit import LEAST_FALL, RISE, linearise, tune
+from scara_ident.diagnosis.linearised import linearise
+from scara_ident.diagnosis.nonlinear_fit import LEAST_FALL, RISE, tune
 from scara_ident.diagnosis.selection_step import SelectionStep
 from scara_ident.effects import Parameter
 from scara_ident.errors import RecordingError
 from scara_ident.estimation.noise_bias import NEGLIGIBLE, noise_shares
 from scara_ident.estimation.run_offsets import offsets_on
+
+# A fit that leaves so many times as much is no rival, whatever rows will weigh in the end.
+RIVAL = 2.0
 
 
 def lowest(step: SelectionStep) -> SelectionStep:
@@ -31,12 +35,15 @@ def lowest(step: SelectionStep) -> SelectionStep:
     best = tune(step)
     if len(_together(best)) < 2:
         return best
-    near = _from_elsewhere(best)
+    ends = _from_elsewhere(replace(best, minima=()))
+    near = _near(best, ends)
     if near:
         other = tune(near[0])
         if linearise(other).error < (1.0 - RISE) * linearise(best).error:
-            return other
-    return best
+            best, ends = other, [best, *(each for each in ends if each is not near[0])]
+    most = RIVAL * linearise(best).error
+    rivals = [each for each in ends if linearise(each).error < most]
+    return replace(best, minima=tuple(_acting(each) for each in (best, *rivals)))
 
 
 def as_good(step: SelectionStep) -> Iterator[SelectionStep]:
@@ -49,7 +56,7 @@ def as_good(step: SelectionStep) -> Iterator[SelectionStep]:
     if not places:
         return
     if len(places) > 1:
-        yield from (other for other in _from_elsewhere(step) if _alike(step, other, places))
+        yield from (other for other in _near(step, _from_elsewhere(step)) if _alike(step, other, places))
         below = _below(step)
         if below is not None and _others(step, below, places):
             yield below
@@ -64,12 +71,34 @@ def _together(step: SelectionStep) -> list[int]:
     return [place for place, item in enumerate(step.chosen) if item.effect.together]
 
 
-def _from_elsewhere(step: SelectionStep) -> list[SelectionStep]:
-    """Return coarse fits that began with one of several effects elsewhere and may come down to the error of a step, the best first."""
+def _acting(step: SelectionStep) -> tuple[Candidate, ...]:
+    return tuple(step.chosen[place] for place in _together(step))
+
+
+def _near(step: SelectionStep, fits: Sequence[SelectionStep]) -> list[SelectionStep]:
+    """Return the coarse fits that may come down to the error of a step, the best first."""
     enough = (1.0 + LEAST_FALL) * linearise(step).error
-    fits = [tune(begun, coarse=True) for begun in _elsewhere(step)]
     errors = [linearise(each).error for each in fits]
     return [fits[k] for k in np.argsort(errors) if errors[k] < enough]
+
+
+def _from_elsewhere(step: SelectionStep) -> list[SelectionStep]:
+    """Return coarse fits that began with one of several effects elsewhere, or where those of the same effects ended."""
+    return [tune(begun, coarse=True) for begun in (_at_rivals(step) if _of_these(step) else _elsewhere(step))]
+
+
+def _of_these(step: SelectionStep) -> bool:
+    """Whether fits of the same effects began elsewhere before."""
+    own, known = ([item.label(step.scene) for item in items] for items in (_acting(step), (step.minima or ((),))[0]))
+    return own == known
+
+
+def _at_rivals(step: SelectionStep) -> Iterator[SelectionStep]:
+    for each in step.minima[1:]:
+        chosen: tuple[Candidate, ...] = step.chosen
+        for place, item in zip(_together(step), each, strict=True):
+            chosen = _with(chosen, place, item)
+        yield replace(step, chosen=chosen)
 
 
 def _elsewhere(step: SelectionStep) -> Iterator[SelectionStep]:

@@ -11,7 +11,6 @@ from scara_ident.diagnosis.at_estimate import at_estimate
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.correction import Correction, taken_out
 from scara_ident.diagnosis.interval_fit import refined
-from scara_ident.diagnosis.nonlinear_fit import tune
 from scara_ident.diagnosis.other_minima import lowest
 from scara_ident.diagnosis.selection_step import SelectionStep, moved_together, observed
 from scara_ident.effects import Scene
@@ -136,8 +135,8 @@ class SearchState:
         if told or not candidate.corrects_data:
             # What each recording has of its own is taken out until nothing is left, and once more at the end.
             state = state.only({winner.label})
-        # What came in and acts with others may have begun nearer to another minimum.
-        step = refined(lowest(state.step) if candidate.effect.together else tune(state.step))
+        # Whatever came in, effects that act together may now have another lowest minimum.
+        step = refined(lowest(state.step))
         fitted = observed(step)
         value, weights = value_and_weights(fitted, step.offsets)
         step = replace(step, scene=at_estimate(step.scene, step.chosen, value), weights=weights)

@@ -48,6 +48,9 @@ class SelectionStep:
         What runs differ by, where all rows are to weigh it as the noise it is: their offsets, or all of it.
     rest : Candidate or None
         What may be left in the data of what was taken out of them, and is no part of an arm, see `Correction.left`.
+    minima : tuple of tuple of Candidate
+        Effects that act together as their fit has them, and as others that began elsewhere; empty where none did. See
+        `scara_ident.diagnosis.other_minima`.
     """
 
     scene: Scene
@@ -58,6 +61,7 @@ class SelectionStep:
     criteria: SelectionCriteria
     variation: RunVariation | None = None
     rest: Candidate | None = None
+    minima: tuple[tuple[Candidate, ...], ...] = ()
 
     def __post_init__(self) -> None:
         """Let the scene know which members act together: others in the model make other columns."""
@@ -145,7 +149,7 @@ class SelectionStep:
         first : Scene, optional
             By whose columns at hand they are judged; default: the step's.
         model : FittedModel, optional
-            In the place of the step's; see `scara_ident.diagnosis.nonlinear_fit.freed_model`.
+            In the place of the step's; see `scara_ident.diagnosis.linearised.freed_model`.
         """
         own = [item for item in candidates if item.effect.of_each_recording]
         if own and model is None:

@@ -60,8 +60,8 @@ class Unknown:
     def share(self, change: float) -> float:
         """Return the share of a step that it may go at once, beyond which the linear model does not hold."""
         reach = LONGEST_STEP if self.owner is None else LONGEST_STEP * abs(self.value) if self.value else np.inf
-        # Its bound stops it, and not all others with it.
-        return reach / max(abs(self.moved(change) - self.value), 1e-300)
+        # A bound that is within reach stops it, and not all others with it.
+        return 1.0 if abs(self.moved(change) - self.value) <= reach else reach / abs(change)
 
     def moved(self, change: float) -> float:
         """Return its value after a step, within its bounds."""

@@ -11,7 +11,8 @@ from scara_ident.diagnosis import diagnose
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.effect_parameters import physical_parameters
-from scara_ident.diagnosis.nonlinear_fit import Linearised, freed_model, linearise, tune
+from scara_ident.diagnosis.linearised import Linearised, freed_model, linearise
+from scara_ident.diagnosis.nonlinear_fit import tune
 from scara_ident.diagnosis.selection_step import SelectionStep
 from scara_ident.effects import Member, effects_named
 from scara_ident.effects.elasticity import Backlash, JointElasticity
@@ -57,16 +58,6 @@ def loss_runs(loss: float, rotor: float):
 def linear(step: SelectionStep, **change) -> Linearised:
     """The linear model of a step, or of one that differs from it."""
     return linearise(replace(step, **change))
-
-
-def dense(state: Linearised) -> np.ndarray:
-    """All columns on the rows of all joints."""
-    tables = []
-    for rows in state.joints:
-        wide = np.zeros((rows.table.shape[1], state.information.parameters))
-        wide[:, rows.columns] = rows.table[:-1].T
-        tables.append(wide)
-    return np.vstack(tables)
 
 
 def tuned(runs, *chosen: Candidate) -> SelectionStep:
@@ -143,66 +134,6 @@ def test_a_clearance_is_fitted_to_its_best_and_not_to_where_the_bodies_no_longer
 def test_without_effects_there_is_nothing_to_tune() -> None:
     step = step_beside(exact_runs())
     assert tune(step) is step
-
-
-def test_the_derivatives_are_those_of_the_predicted_torque() -> None:
-    chosen = (Candidate(Stribeck(), Member(1, (0.2,))), Candidate(TransmissionLoss(), Member(0, (0.3,))))
-    step = step_beside(loss_runs(0.3, 1.0)[:1], chosen, WEIGHTS)
-    scene, state = step.scene, linear(step)
-
-    def predicted(velocity: float, share: float, armature: float) -> np.ndarray:
-        other = replace(scene, armatures={0: armature})
-        moved = linear(step, scene=other, chosen=(chosen[0].at([velocity]), chosen[1].at([share])))
-        return dense(moved)[:, : state.linear] @ state.value
-
-    derivatives = dense(state)[:, state.linear :]
-    at = [0.2, 0.3, scene.nominal_armature(0)]
-    for k, value in enumerate(at):
-        up, down = ([x * (1.0 + sign * 1e-4 * (i == k)) for i, x in enumerate(at)] for sign in (1.0, -1.0))
-        # An armature's parameter is its logarithm.
-        numeric = (predicted(*up) - predicted(*down)) / (2e-4 * (1.0 if k == 2 else value))
-        # The load's absolute value has kinks, at which steps of different length differ, and an armature's is long.
-        bound = 5e-2 if k == 2 else 2e-3
-        assert np.linalg.norm(derivatives[:, k] - numeric) < bound * np.linalg.norm(numeric)
-
-
-def test_the_solution_is_that_of_all_weighted_rows_with_those_of_the_priors() -> None:
-    """From triangular factors, and once more from dense rows."""
-    chosen = (Candidate(Stribeck(), Member(1, (0.2,))), Candidate(TransmissionLoss(), Member(0, (0.3,))))
-    state = linear(step_beside(loss_runs(0.3, 1.0)[:1], chosen, WEIGHTS))
-    size = np.repeat(WEIGHTS, [rows.table.shape[1] for rows in state.joints])
-    torque = size * np.concatenate([rows.table[-1] for rows in state.joints])
-    rows = size[:, None] * dense(state)
-    own = rows[:, : state.linear]
-    assert own @ state.value == pytest.approx(own @ np.linalg.lstsq(own, torque)[0], abs=1e-8 * np.max(np.abs(torque)))
-    left = torque - own @ state.value
-    assert state.variance == pytest.approx(np.mean(left**2), rel=1e-9)
-    prior = state.prior.factor
-    columns = np.vstack([rows, prior[:, :-1]])
-    scale = np.linalg.norm(columns, axis=0)
-    scale[scale == 0.0] = 1.0
-    best = np.linalg.lstsq(columns / scale, np.concatenate([torque, prior[:, -1]]), rcond=1e-9)[0] / scale
-    change, std = state.solve()
-    assert change == pytest.approx(best, rel=1e-6)
-    inverse = np.linalg.pinv((columns / scale).T @ (columns / scale), rcond=1e-18, hermitian=True) / np.outer(
-        scale, scale
-    )
-    assert std[state.linear :] == pytest.approx(np.sqrt(state.variance * np.diag(inverse))[state.linear :], rel=1e-5)
-
-
-def test_beside_a_parameter_at_its_bound_all_others_are_the_best_without_it() -> None:
-    chosen = (Candidate(Stribeck(), Member(1, (0.2,))), Candidate(TransmissionLoss(), Member(0, (0.3,))))
-    free = linear(step_beside(loss_runs(0.3, 1.0)[:1], chosen, WEIGHTS))
-    place, last = free.linear + 1, free.unknowns[1]
-    away = np.sign(free.solve()[0][place])
-    ends = {"upper": last.value} if away > 0.0 else {"lower": last.value}
-    stuck = replace(free, unknowns=(free.unknowns[0], replace(last, **ends), *free.unknowns[2:]))
-    change, _ = stuck.solve()
-    rows = np.delete(np.vstack([free.information.factor, free.prior.factor]), place, axis=1)
-    scale = np.linalg.norm(rows[:, :-1], axis=0)
-    best = np.linalg.lstsq(rows[:, :-1] / scale, rows[:, -1], rcond=1e-9)[0] / scale
-    assert change[place] == 0.0
-    assert np.delete(change, place) == pytest.approx(best, rel=1e-6)
 
 
 def ur5_runs(armature: float):

@@ -5,13 +5,15 @@ from __future__ import annotations
 import sys
 from dataclasses import replace
 from functools import lru_cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.effect_parameters import physical_parameters
-from scara_ident.diagnosis.nonlinear_fit import linearise, tune
+from scara_ident.diagnosis.linearised import linearise
+from scara_ident.diagnosis.nonlinear_fit import tune
 from scara_ident.diagnosis.other_laws import parameters_of_laws
 from scara_ident.diagnosis.other_minima import as_good, lowest, widened
 from scara_ident.diagnosis.selection_step import SelectionStep
@@ -72,6 +74,36 @@ def test_a_fit_that_ended_in_another_minimum_ends_in_the_lowest():
     told, own = parameters_of_laws(right).effects, physical_parameters(right).effects
     for mine, its in zip(told, own, strict=True):
         assert mine["stiffness"].std < 2.0 * its["stiffness"].std
+
+
+def test_fits_begin_where_those_of_the_same_effects_ended(monkeypatch: pytest.MonkeyPatch):
+    step = step_beside(exact_runs(), [Candidate(FAMILY, Member(j, (9.0 - j, 0.1))) for j in (0, 1)])
+    begun = []
+
+    def tuned(step: SelectionStep, **_: bool) -> SelectionStep:
+        begun.append([item.member.nonlinear[0] for item in step.chosen])
+        return step
+
+    def error(step: SelectionStep) -> SimpleNamespace:
+        first, second, *_ = (item.member.nonlinear[0] for item in step.chosen)
+        return SimpleNamespace(error=30.0 if first < 9.0 else 10.0 + first - 9.0 + 3.0 * abs(second - 8.0))
+
+    module = sys.modules[lowest.__module__]
+    monkeypatch.setattr(module, "tune", tuned)
+    monkeypatch.setattr(module, "linearise", error)
+    best = lowest(step)
+    assert begun == [[9.0, 8.0], [5.625, 8.0], [14.4, 8.0], [9.0, 5.0], [9.0, 12.8]]
+    # Those that leave twice as much are no rivals.
+    rivals = [[item.member.nonlinear[0] for item in each] for each in best.minima]
+    assert rivals == [[9.0, 8.0], [14.4, 8.0], [9.0, 5.0]]
+    monkeypatch.setattr(module, "_below", lambda _: None)
+    begun.clear()
+    assert list(as_good(best)) == []
+    assert begun[:2] == rivals[1:] and all(len(each) == 3 for each in begun[2:])
+    begun.clear()
+    # Of other effects they say nothing.
+    list(as_good(replace(best, chosen=best.chosen[::-1])))
+    assert begun[:4] == [[5.0, 9.0], [12.8, 9.0], [8.0, 5.625], [8.0, 14.4]]
 
 
 @pytest.mark.slow

@@ -1,0 +1,303 @@
+"""A model with effects, linear in all its parameters about the present nonlinear ones.
+
+Columns of an effect may follow from the bodies as strongly as from its own parameters, as an elastic joint's do. Such an
+effect is tied: it says what its coefficient is and what its torque changes by, and the columns of the bodies take that up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.arrays import Array
+from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, Rows, with_columns
+from scara_ident.diagnosis.fitted_model import FittedModel
+from scara_ident.diagnosis.selection_step import SelectionStep
+from scara_ident.diagnosis.unknowns import Unknown, unknowns_of
+from scara_ident.effects import Scene, Tie
+from scara_ident.estimation.information import Information, merge, weighted
+from scara_ident.estimation.joint_rows import JointRows
+from scara_ident.estimation.run_variation import RunVariation
+from scara_ident.threads import one_blas_thread, side_by_side
+
+# Directions whose singular value, columns scaled to unit length, is below this share of the largest take no step.
+STEPLESS = 1e-9
+# A row that ties a coefficient is so many times as weighty as all rows that it acts on.
+TIGHTNESS = 1e3
+
+
+@dataclass(frozen=True, eq=False)
+class Linearised:
+    """A model with effects, linear in all its parameters about the present nonlinear ones.
+
+    Attributes
+    ----------
+    places : tuple of slice
+        Columns of each effect.
+    joints : tuple of JointRows
+        Columns of the base model, of the effects, and the change of the torque per unit of each nonlinear parameter.
+    information : Information
+        Of all weighted rows, with offsets of runs as noise; its parameters are k linear ones, then s nonlinear ones.
+    ties : Information
+        Rows that hold the coefficients of tied effects to what the nonlinear parameters and the rigid bodies say of them.
+    """
+
+    scene: Scene
+    chosen: tuple[Candidate, ...]
+    unknowns: tuple[Unknown, ...]
+    places: tuple[slice, ...]
+    joints: tuple[JointRows, ...]
+    information: Information
+    ties: Information
+
+    @property
+    def linear(self) -> int:
+        """Number of linear parameters k."""
+        return self.information.parameters - len(self.unknowns)
+
+    @cached_property
+    def value(self) -> Array:
+        """Linear parameters that fit best at the present nonlinear ones, shape (k,)."""
+        return _solved(self.information, self.ties, self.linear)
+
+    @cached_property
+    def rows(self) -> int:
+        """Number of rows."""
+        return sum(rows.table.shape[1] for rows in self.joints)
+
+    @cached_property
+    def variance(self) -> float:
+        """Mean squared residual of a weighted row."""
+        value = np.concatenate([self.value, np.zeros(len(self.unknowns))])
+        return self.information.residual_sum(value) / self.rows
+
+    @property
+    def error(self) -> float:
+        """Squared residual with what the priors add to it, the bodies as they were where effects follow from them."""
+        prior = sum(((item.value - item.nominal) / item.spread) ** 2 for item in self.unknowns)
+        left = self.variance * self.rows
+        if len(self.ties.factor):
+            value = np.concatenate([_solved(self.information, self._held, self.linear), np.zeros(len(self.unknowns))])
+            left = self.information.residual_sum(value)
+        return left + self.variance * prior
+
+    @property
+    def _held(self) -> Information:
+        """The ties, and rows that hold the rigid bodies to the present estimate."""
+        place = self.scene.model.place(self.scene.model.rigid_body)
+        size = np.linalg.norm(self.information.factor[:, place], axis=0)
+        rows = np.zeros((len(size), self.information.parameters + 1))
+        rows[:, place], rows[:, -1] = np.diag(size), size * self.scene.value[place]
+        return merge([self.ties, Information(TIGHTNESS * rows, 0.0)])
+
+    @property
+    def prior(self) -> Information:
+        """Rows of the priors on the nonlinear parameters, as weighty as measured rows."""
+        known = [k for k, item in enumerate(self.unknowns) if np.isfinite(item.spread)]
+        rows = np.zeros((len(known), self.information.parameters + 1))
+        for row, k in enumerate(known):
+            item = self.unknowns[k]
+            weight = np.sqrt(self.variance) / item.spread
+            rows[row, self.linear + k] = weight
+            rows[row, -1] = weight * (item.nominal - item.value)
+        return merge([Information(rows, 0.0), self.ties])
+
+    def solve(self, damping: float = 0.0) -> tuple[Array, Array]:
+        """Return the best parameters, nonlinear ones as a change, and the white standard deviations of all.
+
+        Those that would leave their bounds stay there, and all others are the best beside them.
+
+        Parameters
+        ----------
+        damping : float, optional
+            By which the change of each nonlinear parameter is held back, as a share of how strongly rows tell it beside the linear
+            ones (Marquardt 1963).
+        """
+        best, std = self._solve(damping, np.zeros(0, dtype=np.intp))
+        changes = best[self.linear :]
+        stuck = [item.moved(change) == item.value for item, change in zip(self.unknowns, changes, strict=True)]
+        return self._solve(damping, self.linear + np.flatnonzero(stuck)) if any(stuck) else (best, std)
+
+    def _solve(self, damping: float, held: NDArray[np.intp]) -> tuple[Array, Array]:
+        rows = np.vstack([self.information.factor, self.prior.factor])
+        if damping:
+            triangular = np.asarray(np.linalg.qr(rows[:, :-1], mode="r"))
+            beside = triangular[self.linear :, self.linear :]
+            further = np.zeros((len(self.unknowns), rows.shape[1]))
+            further[:, self.linear : -1] = np.diag(np.sqrt(damping) * np.linalg.norm(beside, axis=0))
+            rows = np.vstack([rows, further])
+        columns, target = rows[:, :-1].copy(), rows[:, -1]
+        columns[:, held] = 0.0
+        size = np.linalg.norm(columns, axis=0)
+        size[size == 0.0] = 1.0
+        left, singular, right = np.linalg.svd(columns / size, full_matrices=False)
+        kept = singular > STEPLESS * singular[0]
+        half = right[kept].T / singular[kept]
+        best = half @ (left[:, kept].T @ target) / size
+        return best, np.sqrt(self.variance * np.sum(half**2, axis=1)) / size
+
+
+def linearise(step: SelectionStep) -> Linearised:
+    """Return the model of a step, linear about the present nonlinear parameters.
+
+    What offsets of runs make is noise, see `Estimate.offsets`.
+    """
+    scene, columns, chosen, weights = step.scene, step.columns, step.chosen, step.weights
+    observations = columns.observations
+    unknowns = unknowns_of(scene, chosen, step.criteria.rotor_inertia_std)
+    own = columns.rows(scene, chosen)
+    bounds = observations.parameters + np.cumsum([0, *(len(next(iter(rows.values()))) for rows in own)])
+    places = tuple(slice(int(a), int(b)) for a, b in zip(bounds[:-1], bounds[1:], strict=True))
+    joints = with_columns(observations, own)
+    linear, total = int(bounds[-1]), int(bounds[-1]) + len(unknowns)
+    slopes: dict[int, tuple[Array, ...]] = {}
+    ties = []
+    for owner, candidate in enumerate(chosen):
+        tie = candidate.effect.tie(scene, candidate.member)
+        if tie is not None:
+            slopes[owner] = columns.slopes(scene, candidate)
+            joints = _with_slopes(joints, slopes[owner], scene)
+            size = _size(joints, int(bounds[owner]), weights)
+            ties.append(TIGHTNESS * size * _tie_row(scene, chosen, unknowns, owner, tie, int(bounds[owner]), linear))
+    held = Information(np.array(ties).reshape(-1, total + 1), 0.0)
+    value = _solved(_pooled(joints, total, weights, step.offsets), held, linear)
+    changes = [_change(scene, columns, chosen, item, places, value, slopes) for item in unknowns]
+    extended = tuple(_beside(rows, joint, changes, linear) for joint, rows in enumerate(joints))
+    information = _pooled(extended, total, weights, step.offsets)
+    return Linearised(scene, chosen, unknowns, places, extended, information, held)
+
+
+def freed_model(step: SelectionStep) -> FittedModel:
+    """Return a fitted model in which nonlinear parameters may move with all others, as far as it is linear in them.
+
+    What takes up most of what is missing by a wrong value of them leaves nothing of it to candidates beside them as they are.
+    """
+    state = linearise(step)
+    return step.fitted(state.joints, state.information.parameters)
+
+
+def _solved(information: Information, ties: Information, linear: int) -> Array:
+    """Return the linear parameters that fit best where the nonlinear ones stay, ties kept."""
+    held = Information(ties.factor[:, [*range(linear), -1]], 0.0)
+    return merge([information.select(range(linear)), held]).solve().value
+
+
+def _with_slopes(joints: Sequence[JointRows], slopes: Sequence[Array], scene: Scene) -> tuple[JointRows, ...]:
+    """Return rows whose columns of the rigid bodies have what an effect's torque changes by with their parameters.
+
+    The torque has it too, at the present parameters, so that what is left stays what it is.
+    """
+    place = scene.model.place(scene.model.rigid_body)
+    found = []
+    for rows, all_slopes in zip(joints, slopes, strict=True):
+        own = all_slopes[: place.stop - place.start]
+        bodies = np.arange(place.start, place.stop)
+        missing = bodies[~np.isin(bodies, rows.columns) & np.any(own != 0.0, axis=1)]
+        places = np.concatenate([rows.columns, missing])
+        table = np.concatenate([rows.table[:-1], np.zeros((len(missing), rows.table.shape[1])), rows.table[-1:]])
+        inside = (places >= place.start) & (places < place.stop)
+        table[:-1][inside] += own[places[inside] - place.start]
+        table[-1] += scene.value[place] @ own
+        found.append(JointRows(places, table, rows.starts, rows.counts))
+    return tuple(found)
+
+
+def _tie_row(
+    scene: Scene,
+    chosen: Sequence[Candidate],
+    unknowns: Sequence[Unknown],
+    owner: int,
+    tie: Tie,
+    column: int,
+    linear: int,
+) -> Array:
+    """Return the row that ties an effect's coefficient, shape (k + s + 1,)."""
+    place = scene.model.place(scene.model.rigid_body)
+    by_bodies = tie.slopes[: place.stop - place.start]
+    row = np.zeros(linear + len(unknowns) + 1)
+    row[column] = 1.0
+    row[place] = -by_bodies
+    row[-1] = tie.value - by_bodies @ scene.value[place]
+    for k, item in enumerate(unknowns):
+        which, factor = _slope_of(scene, chosen, item, owner)
+        if which is not None:
+            row[linear + k] = -factor * tie.slopes[which]
+    return row
+
+
+def _slope_of(scene: Scene, chosen: Sequence[Candidate], item: Unknown, owner: int) -> tuple[int | None, float]:
+    """Return which of a tied effect's slopes is by a nonlinear parameter, and what to multiply it with."""
+    bodies = len(scene.model.rigid_body.columns)
+    if item.owner == owner:
+        return bodies + 1 + item.place, 1.0
+    if item.owner is None and chosen[owner].effect.geared_joint(chosen[owner].member) == item.place:
+        return bodies, scene.armature(item.place)
+    return None, 0.0
+
+
+def _size(joints: Sequence[JointRows], column: int, weights: Array) -> float:
+    """Return the weighted length of a column."""
+    parts = (rows.table[:-1][rows.columns == column] for rows in joints)
+    return float(np.linalg.norm([w * np.linalg.norm(part) for w, part in zip(weights, parts, strict=True)]))
+
+
+def _pooled(joints: Sequence[JointRows], parameters: int, weights: Array, offsets: RunVariation | None) -> Information:
+    joints = joints if offsets is None else offsets.whitened_rows(joints)
+    with one_blas_thread():
+        return weighted(side_by_side(lambda rows: rows.information(parameters), joints), weights)
+
+
+def _change(
+    scene: Scene,
+    columns: CandidateColumns,
+    chosen: Sequence[Candidate],
+    item: Unknown,
+    places: Sequence[slice],
+    value: Array,
+    slopes: Mapping[int, tuple[Array, ...]],
+) -> dict[int, Array]:
+    """Return the change of each joint's torque per unit of a nonlinear parameter, shape (N,)."""
+    total: dict[int, Array] = {}
+    for owner, place in enumerate(places):
+        if item.owner is not None and owner != item.owner:
+            continue
+        if owner in slopes:
+            which, factor = _slope_of(scene, chosen, item, owner)
+            if which is not None:
+                for joint, own in enumerate(slopes[owner]):
+                    total[joint] = total.get(joint, 0.0) + factor * own[which]
+            continue
+        sides: list[Rows] = []
+        for sign in (1.0, -1.0):
+            at = item.value + sign * item.step
+            if item.owner is None:
+                sides += columns.rows(_with_armature(scene, item.place, float(np.exp(at))), [chosen[owner]])
+            else:
+                sides += columns.rows(scene, [moved_candidate(chosen[owner], item.place, at)])
+        for joint in sides[0]:
+            change = value[place] @ (sides[0][joint] - sides[1][joint]) / (2.0 * item.step)
+            total[joint] = total.get(joint, 0.0) + change
+    return total
+
+
+def _beside(rows: JointRows, joint: int, changes: Sequence[dict[int, Array]], first: int) -> JointRows:
+    acting = [k for k, change in enumerate(changes) if joint in change]
+    if not acting:
+        return rows
+    table = np.concatenate([rows.table[:-1], [changes[k][joint] for k in acting], rows.table[-1:]])
+    return JointRows(np.concatenate([rows.columns, [first + k for k in acting]]), table, rows.starts, rows.counts)
+
+
+def moved_candidate(candidate: Candidate, place: int, value: float) -> Candidate:
+    """Return a candidate with another value of one of its nonlinear parameters."""
+    nonlinear = list(candidate.member.nonlinear)
+    nonlinear[place] = value
+    return candidate.at(nonlinear)
+
+
+def _with_armature(scene: Scene, joint: int, value: float) -> Scene:
+    return replace(scene, armatures={**scene.armatures, joint: value})

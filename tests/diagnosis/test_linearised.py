@@ -1,0 +1,106 @@
+"""A model that is linear about its nonlinear parameters: its derivatives, and its solutions against those of dense rows."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from scara_ident.diagnosis.candidates import Candidate
+from scara_ident.diagnosis.linearised import Linearised
+from scara_ident.effects import Member
+from scara_ident.effects.friction import Stribeck
+from scara_ident.effects.gear import TransmissionLoss
+from tests.diagnosis.made import step_beside
+from tests.diagnosis.test_nonlinear_fit import WEIGHTS, linear, loss_runs
+
+pytestmark = pytest.mark.slow
+
+
+def dense(state: Linearised) -> np.ndarray:
+    """All columns on the rows of all joints."""
+    tables = []
+    for rows in state.joints:
+        wide = np.zeros((rows.table.shape[1], state.information.parameters))
+        wide[:, rows.columns] = rows.table[:-1].T
+        tables.append(wide)
+    return np.vstack(tables)
+
+
+def test_the_derivatives_are_those_of_the_predicted_torque() -> None:
+    chosen = (Candidate(Stribeck(), Member(1, (0.2,))), Candidate(TransmissionLoss(), Member(0, (0.3,))))
+    step = step_beside(loss_runs(0.3, 1.0)[:1], chosen, WEIGHTS)
+    scene, state = step.scene, linear(step)
+
+    def predicted(velocity: float, share: float, armature: float) -> np.ndarray:
+        other = replace(scene, armatures={0: armature})
+        moved = linear(step, scene=other, chosen=(chosen[0].at([velocity]), chosen[1].at([share])))
+        return dense(moved)[:, : state.linear] @ state.value
+
+    derivatives = dense(state)[:, state.linear :]
+    at = [0.2, 0.3, scene.nominal_armature(0)]
+    for k, value in enumerate(at):
+        up, down = ([x * (1.0 + sign * 1e-4 * (i == k)) for i, x in enumerate(at)] for sign in (1.0, -1.0))
+        # An armature's parameter is its logarithm.
+        numeric = (predicted(*up) - predicted(*down)) / (2e-4 * (1.0 if k == 2 else value))
+        # The load's absolute value has kinks, at which steps of different length differ, and an armature's is long.
+        bound = 5e-2 if k == 2 else 2e-3
+        assert np.linalg.norm(derivatives[:, k] - numeric) < bound * np.linalg.norm(numeric)
+
+
+def test_the_solution_is_that_of_all_weighted_rows_with_those_of_the_priors() -> None:
+    """From triangular factors, and once more from dense rows."""
+    chosen = (Candidate(Stribeck(), Member(1, (0.2,))), Candidate(TransmissionLoss(), Member(0, (0.3,))))
+    state = linear(step_beside(loss_runs(0.3, 1.0)[:1], chosen, WEIGHTS))
+    size = np.repeat(WEIGHTS, [rows.table.shape[1] for rows in state.joints])
+    torque = size * np.concatenate([rows.table[-1] for rows in state.joints])
+    rows = size[:, None] * dense(state)
+    own = rows[:, : state.linear]
+    assert own @ state.value == pytest.approx(own @ np.linalg.lstsq(own, torque)[0], abs=1e-8 * np.max(np.abs(torque)))
+    left = torque - own @ state.value
+    assert state.variance == pytest.approx(np.mean(left**2), rel=1e-9)
+    prior = state.prior.factor
+    columns = np.vstack([rows, prior[:, :-1]])
+    scale = np.linalg.norm(columns, axis=0)
+    scale[scale == 0.0] = 1.0
+    best = np.linalg.lstsq(columns / scale, np.concatenate([torque, prior[:, -1]]), rcond=1e-9)[0] / scale
+    change, std = state.solve()
+    assert change == pytest.approx(best, rel=1e-6)
+    inverse = np.linalg.pinv((columns / scale).T @ (columns / scale), rcond=1e-18, hermitian=True) / np.outer(
+        scale, scale
+    )
+    assert std[state.linear :] == pytest.approx(np.sqrt(state.variance * np.diag(inverse))[state.linear :], rel=1e-5)
+
+
+def test_beside_a_parameter_at_its_bound_all_others_are_the_best_without_it() -> None:
+    chosen = (Candidate(Stribeck(), Member(1, (0.2,))), Candidate(TransmissionLoss(), Member(0, (0.3,))))
+    free = linear(step_beside(loss_runs(0.3, 1.0)[:1], chosen, WEIGHTS))
+    place, last = free.linear + 1, free.unknowns[1]
+    away = np.sign(free.solve()[0][place])
+    ends = {"upper": last.value} if away > 0.0 else {"lower": last.value}
+    stuck = replace(free, unknowns=(free.unknowns[0], replace(last, **ends), *free.unknowns[2:]))
+    change, _ = stuck.solve()
+    rows = np.delete(np.vstack([free.information.factor, free.prior.factor]), place, axis=1)
+    scale = np.linalg.norm(rows[:, :-1], axis=0)
+    best = np.linalg.lstsq(rows[:, :-1] / scale, rows[:, -1], rcond=1e-9)[0] / scale
+    assert change[place] == 0.0
+    assert np.delete(change, place) == pytest.approx(best, rel=1e-6)
+
+
+@pytest.mark.parametrize("damping", [0.5, 7.0])
+def test_a_step_that_is_held_back_is_the_best_of_that_penalty_and_linear_parameters_are_free(damping: float) -> None:
+    chosen = (Candidate(Stribeck(), Member(1, (0.2,))), Candidate(TransmissionLoss(), Member(0, (0.3,))))
+    state = linear(step_beside(loss_runs(0.3, 1.0)[:1], chosen, WEIGHTS))
+    rows = np.vstack([state.information.factor, state.prior.factor])
+    own, theirs = rows[:, : state.linear], rows[:, state.linear : -1]
+    beside = theirs - own @ np.linalg.lstsq(own, theirs, rcond=1e-9)[0]
+    left = rows[:, -1] - own @ np.linalg.lstsq(own, rows[:, -1], rcond=1e-9)[0]
+    normal = beside.T @ beside
+    best = np.linalg.solve(normal + damping * np.diag(np.diag(normal)), beside.T @ left)
+    found, _ = state.solve(damping)
+    assert found[state.linear :] == pytest.approx(best, rel=1e-5)
+    given = np.linalg.lstsq(own, rows[:, -1] - theirs @ best, rcond=1e-9)[0]
+    assert own @ found[: state.linear] == pytest.approx(own @ given, abs=1e-7 * np.max(np.abs(rows[:, -1])))
+    whole = state.solve()[0][state.linear :]
+    assert np.linalg.norm(beside @ best) < np.linalg.norm(beside @ whole)
