@@ -63,8 +63,8 @@ def select_model(task: SearchTask, observations: Observations, *, free: bool) ->
             # The motion says less of what is so far up, and there is nothing.
             break
         found.step.columns.leave()
-        # The motion says less of what is so far up.
-        narrower = found if promised > explains else None
+        # For what was found there, not for what the motion tells or effects in the model ask for.
+        narrower = found if promised > explains and not told else None
         found = again
     left("testing what is left")
     outcome = _without_proxies(replace(task, progress=left), outcome_of(task, found))
