@@ -340,13 +340,14 @@ def points_of_lines(candidate: Candidate) -> int:
 def _line(scene: Scene, candidate: Candidate, round_: int) -> list[Candidate]:
     """Return variants of a candidate on a line for each nonlinear parameter, a third as long every round."""
     variants = []
-    for k, parameter in enumerate(candidate.effect.nonlinear):
+    limits = candidate.effect.limits(scene, candidate.member)
+    for k, (parameter, (lower, upper)) in enumerate(zip(candidate.effect.nonlinear, limits, strict=True)):
         value = candidate.member.nonlinear[k]
         reach = _spacing(scene, candidate, k) * (2.0 / (LINE_POINTS - 1)) ** round_
         offsets = np.linspace(-reach, reach, LINE_POINTS)
         points = value * np.exp(offsets) if parameter.logarithmic else value + offsets
         for point in points:
-            if abs(point - value) > 1e-12 * abs(value) and parameter.lower <= point <= parameter.upper:
+            if abs(point - value) > 1e-12 * abs(value) and lower <= point <= upper:
                 nonlinear = list(candidate.member.nonlinear)
                 nonlinear[k] = float(point)
                 variants.append(candidate.at(nonlinear))

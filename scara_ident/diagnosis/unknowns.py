@@ -71,9 +71,9 @@ class Unknown:
 def unknowns_of(scene: Scene, chosen: Sequence[Candidate], rotor_inertia_std: float) -> tuple[Unknown, ...]:
     """Return the nonlinear parameters of the effects, then the armatures."""
     found = [
-        Unknown(owner, place, candidate.member.nonlinear[place], parameter.lower, parameter.upper)
+        Unknown(owner, place, candidate.member.nonlinear[place], lower, upper)
         for owner, candidate in enumerate(chosen)
-        for place, parameter in enumerate(candidate.effect.nonlinear)
+        for place, (lower, upper) in enumerate(candidate.effect.limits(scene, candidate.member))
     ]
     joints = [candidate.effect.geared_joint(candidate.member) for candidate in chosen]
     for joint in dict.fromkeys(joint for joint in joints if joint is not None):

@@ -183,6 +183,12 @@ class Effect(ABC):
         ]
         return (tuple(float(x) for x in values) for values in product(*grids))
 
+    def limits(self, scene: Scene, member: Member) -> tuple[tuple[float, float], ...]:
+        """Return the smallest and largest value of every nonlinear parameter on the member's joint."""
+        joint = member.joint
+        unit = [1.0 if joint is None or not item.of_length else float(scene.radian[joint]) for item in self.nonlinear]
+        return tuple((x * item.lower, x * item.upper) for x, item in zip(unit, self.nonlinear, strict=True))
+
     def members(self, scene: Scene) -> tuple[Member, ...]:
         """Return the members worth trying on this robot and these recordings."""
         return tuple(Member(j, values) for j in self.joints(scene) for values in self.scan(scene, j))

@@ -37,12 +37,14 @@ BOTH_SIDES = 1.5
 LEAST_COUPLING = 0.2
 # With less damping than this two gears are not fitted from a guess: the phase after a few swings would be anything.
 STEADY_DAMPING = 0.05
-# Clearances tried, rad or m at the joint: three times apart, which refinement bridges.
+# Clearances tried, rad at the joint: three times apart, which refinement bridges. Of a joint that slides more, as multiples of
+# `Scene.radian`: a nut on its screw or a pinion has micrometres to millimetres, of a travel of millimetres to metres.
 WIDTHS = (3e-4, 1e-3, 3e-3)
+SLIDE_WIDTHS = (1e-5, 2.7e-5, 7.4e-5, 2e-4, 5.5e-4, 1.5e-3, 4e-3, 0.011, 0.03)
 # The motion that is known within a band rounds off the blow of a landing: recordings without noise give a width that is up to
 # twice this share too small.
 ROUNDED_OFF = 0.04
-# A clearance of more, rad or m, is felt by hand.
+# A clearance of more, rad, or of a joint that slides multiples of `Scene.radian`, is felt by hand.
 LARGEST_WIDTH = 0.05
 
 
@@ -211,16 +213,23 @@ class Backlash(BehindGear):
     coefficients = (
         Coefficient(
             "width", "{position}", "clearance in the gear of {joint}", "the clearance would be negative",
-            LARGEST_WIDTH, "a clearance of {value:.2g} {position} would rattle by hand",
         ),
     )  # fmt: skip
-    nonlinear = (NonlinearParameter("_flown_width", "{position}", 1e-5, LARGEST_WIDTH),)
+    nonlinear = (NonlinearParameter("_flown_width", "{position}", 1e-5, LARGEST_WIDTH, of_length=True),)
     view = View("reversal", along=True, distance="width")
     experiment = "reverse under little load, and look for the angle within which no torque is needed"
 
     def scan(self, scene: Scene, joint: int) -> Iterable[tuple[float, ...]]:
-        """Return three widths."""
-        return ((width,) for width in WIDTHS)
+        """Return three widths, and more of a joint that slides."""
+        widths = SLIDE_WIDTHS if scene.robot.prismatic[joint] else WIDTHS
+        return ((float(scene.radian[joint] * width),) for width in widths)
+
+    def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
+        """Say so of a clearance that anybody would have felt."""
+        wrong = super().inadmissible(scene, member, value, std)
+        if wrong is None and value[0] > LARGEST_WIDTH * scene.radian[member.place] + DOUBT_STDS * std[0]:
+            return f"a clearance of {value[0]:.2g} {scene.robot.position_unit(member.place)} would rattle by hand"
+        return wrong
 
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
         """Return the change of torque per width."""

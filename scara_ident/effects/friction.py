@@ -19,6 +19,8 @@ from scara_ident.model.terms import Column, Friction
 STRIBECK_SHARES = (0.006, 0.015, 0.04, 0.1, 0.25)
 # Stribeck velocities, as shares of the largest speed, above which it is friction at any speed.
 WIDEST_STRIBECK = 0.5
+# Least Stribeck velocity of a joint that slides, as a share of its largest speed.
+SLOWEST_STRIBECK = 1e-4
 # Friction that a joint has only at low speed is not larger than this many times its Coulomb friction.
 LARGEST_STRIBECK_SHARE = 2.0
 # A joint that travels less, rad, shows no friction that varies with its position.
@@ -87,6 +89,13 @@ class Stribeck(Effect):
     def scan(self, scene: Scene, joint: int) -> Iterable[tuple[float, ...]]:
         """Return shares of the joint's largest speed."""
         return ((share * float(scene.speed[joint]),) for share in STRIBECK_SHARES)
+
+    def limits(self, scene: Scene, member: Member) -> tuple[tuple[float, float], ...]:
+        """Return shares of the largest speed of a joint that slides, whose speeds may be those of a stage or of a gantry."""
+        if not scene.robot.prismatic[member.place]:
+            return super().limits(scene, member)
+        speed = float(scene.speed[member.place])
+        return ((SLOWEST_STRIBECK * speed, speed),)
 
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
         """Return ``sign(v) exp(-|v/velocity|^exponent)``."""
@@ -193,6 +202,12 @@ class PositionDependentFriction(Sinusoid):
         if signals.scene.robot.prismatic[j]:
             angle = np.pi / signals.scene.travel[j] * angle
         return [signals.sign[j] * np.sin(angle), signals.sign[j] * np.cos(angle)]
+
+    def description(self, scene: Scene, member: Member) -> str:
+        """Say of a joint that slides what its phase is of."""
+        if not scene.robot.prismatic[member.place]:
+            return super().description(scene, member)
+        return f"{super().description(scene, member)}, over a period of {2.0 * scene.travel[member.place]:.4g} m"
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """Say so where friction does not brake at every position."""

@@ -30,9 +30,11 @@ class NonlinearParameter:
     unit : str
         May hold the words of `Effect.words`, as ``{position}`` for rad or m.
     lower, upper : float
-        What a real arm can have; refinement stays within.
+        What a real arm can have, see `Effect.limits`; refinement stays within.
     logarithmic : bool
         Whether it is scanned and refined on a logarithmic scale.
+    of_length : bool
+        Whether it is a way of the joint: of one that slides ``lower`` and ``upper`` are multiples of `Scene.radian`.
     """
 
     name: str
@@ -40,6 +42,7 @@ class NonlinearParameter:
     lower: float
     upper: float
     logarithmic: bool = True
+    of_length: bool = False
 
 
 @dataclass(frozen=True)

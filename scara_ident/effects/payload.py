@@ -18,7 +18,7 @@ from scara_ident.effects.recording_groups import SLOWEST, groups_by_torque
 from scara_ident.effects.signals import Scene, Signals
 from scara_ident.effects.sinusoid import Sinusoid
 from scara_ident.effects.spanned import rows_by_sample
-from scara_ident.model.base_parameters import BODY_PARAMETERS, BODY_UNITS
+from scara_ident.model.base_parameters import BODY_PARAMETERS, BODY_UNITS, size_of
 from scara_ident.model.terms import Column
 from scara_ident.motion.motion import Motion
 from scara_ident.robot.robot import Robot
@@ -37,7 +37,7 @@ BODY_COLUMNS, BODY_COLUMN_SHARE = 10, 1e-3
 SEEN_STDS = 3.0
 # Joints on which a payload's torque is below this share of its largest hardly tell when it came.
 LOADED = 0.2
-# A tool nearer to the last joint than this, m, says nothing of how far out an unknown payload sits.
+# A tool nearer to the last joint than this share of the arm's size says nothing of how far out an unknown payload sits.
 SHORTEST_ARM = 0.1
 
 
@@ -336,11 +336,15 @@ def shown_of(robot: Robot, most: int = FREE_COLUMNS, share: float = FREE_COLUMN_
     """Return the standard parameters of a payload that tell most, each beside those before it, mass first if it can."""
     tool = tool_of(robot)
     rng = np.random.default_rng(0)
-    scales = (np.where(robot.prismatic, 0.3, np.pi), np.where(robot.prismatic, 0.3, 1.0), np.full(robot.n, 3.0))
+    # By the arm's size, so that what a metre is makes no difference.
+    size = size_of(robot)
+    unit = np.where(robot.prismatic, size, 1.0)
+    scales = (np.where(robot.prismatic, 0.3, np.pi) * unit, np.where(robot.prismatic, 0.3, 1.0) * unit, 3.0 * unit)
     q, v, a = (scale[:, None] * rng.uniform(-1.0, 1.0, (robot.n, 60)) for scale in scales)
     motion = Motion("random", "random", np.arange(60.0), q, v, a, None, 1.0)
-    arm = max(float(np.linalg.norm(tool.point)), SHORTEST_ARM)
-    columns = tool.columns(robot, motion) / np.abs(robot.row_scale)[:, None, None]
+    arm = max(float(np.linalg.norm(tool.point)), SHORTEST_ARM * size)
+    force = np.abs(robot.row_scale) * np.where(robot.prismatic, 1.0, size)
+    columns = tool.columns(robot, motion) / force[:, None, None]
     rows = rows_by_sample(columns) * arm ** np.array([0, 1, 1, 1, 2, 2, 2, 2, 2, 2])
     largest = float(np.max(np.linalg.norm(rows, axis=0))) or 1.0
     chosen: list[int] = []

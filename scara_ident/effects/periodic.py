@@ -41,6 +41,15 @@ class PerMotorTurn(Sinusoid):
     view = View("order")
     orders: ClassVar[tuple[float, ...]] = ORDERS
 
+    def joints(self, scene: Scene) -> list[int]:
+        """Return the joints of which it is known what a turn is: of a slide without a reduction it would be 2 pi metres."""
+        known = ~scene.robot.prismatic | (np.abs(scene.robot.reduction) != 1.0)
+        return [j for j in super().joints(scene) if known[j]]
+
+    def seeds(self, scene: Scene, joint: int, line: SpectralLine) -> tuple[Member, ...]:
+        """Return none of a joint of which that is not known."""
+        return super().seeds(scene, joint, line) if joint in self.joints(scene) else ()
+
     def scan(self, scene: Scene, joint: int) -> Iterable[tuple[float, ...]]:
         """Return the orders with enough periods in the travel that lie within the band while the joint is slow."""
         return ((x,) for x in self._in_band(scene, joint) if x >= PERIODS_COVERED * _order_resolution(scene, joint))

@@ -15,8 +15,9 @@ from scara_ident.effects.signals import Scene, Signals
 
 # Distances tried, rad: three times apart, which refinement bridges, over what joints have.
 DISTANCES = (0.0004, 0.0012, 0.004, 0.012, 0.036)
-# On a joint that translates distances are those on a pinion of this radius, m.
-METRES_PER_RADIAN = 0.1
+# Of a joint that slides shorter ones too, as multiples of `Scene.radian`: rolling guides slide after some micrometres, and their
+# travel may be a few millimetres or some metres.
+SLIDE_DISTANCES = (0.000015, 0.000045, 0.000134, *DISTANCES)
 # A distance above this share of the travel is a spring rather than friction.
 LONGEST_SHARE = 0.15
 # Friction in the state is at least this many times what slides, or it is something else.
@@ -43,15 +44,16 @@ class Presliding(Effect):
             "friction would be largest just after a reversal",
         ),
     )  # fmt: skip
-    nonlinear = (NonlinearParameter("presliding_distance", "{position}", 1e-5, 0.3),)
+    nonlinear = (NonlinearParameter("presliding_distance", "{position}", 1e-5, 0.3, of_length=True),)
     in_small_ways = True
     view = View("reversal", along=True, distance="presliding_distance")
     experiment = "reverse often with small amplitude at two speeds: its memory is in angle, a delay's is in time"
 
     def scan(self, scene: Scene, joint: int) -> Iterable[tuple[float, ...]]:
         """Return distances that the joint's travel holds many times."""
-        scale = METRES_PER_RADIAN if scene.robot.prismatic[joint] else 1.0
-        return ((scale * x,) for x in DISTANCES if scale * x <= LONGEST_SHARE * scene.travel[joint])
+        distances = SLIDE_DISTANCES if scene.robot.prismatic[joint] else DISTANCES
+        tried = (float(scene.radian[joint] * x) for x in distances)
+        return ((x,) for x in tried if x <= LONGEST_SHARE * scene.travel[joint])
 
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
         """Return ``z - sign(v)`` in the drive's direction."""

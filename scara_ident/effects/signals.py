@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from scara_ident.effects.effect import Effect
     from scara_ident.effects.parameters import Member
 
+# Share of its range that a joint must travel at the least for its travel to say anything of it.
+SMALLEST_TRAVEL = 1e-3
+
 
 @dataclass(frozen=True)
 class LinkTorque:
@@ -80,6 +83,19 @@ class Scene:
     def robot(self) -> Robot:
         """The robot."""
         return self.model.robot
+
+    @cached_property
+    def radian(self) -> Array:
+        """What goes with a radian of a joint that turns, shape (n,): 1, and of one that slides its travel over pi, m.
+
+        Lengths that are tried, and limits of them, are multiples of it: they then depend on no unit, and a stage of some
+        millimetres has as many of them as a gantry of some metres. A joint that stands still has the range that its limits
+        leave.
+        """
+        robot, length = self.robot, self.travel
+        stroke = np.where(np.isfinite(robot.upper - robot.lower), robot.upper - robot.lower, 1.0)
+        length = np.where(length > SMALLEST_TRAVEL * stroke, length, stroke)
+        return np.where(robot.prismatic, length / np.pi, 1.0)
 
     def armature(self, joint: int) -> float:
         """Armature N^2 Jm of a joint: what the data tell of it, else its nominal value."""

@@ -307,7 +307,8 @@ def _find_effort_unit(result: Guess, meanings: Mapping[str, Meaning], robot: Rob
         elif said.words & TORQUE:
             units[k] = next(iter(table))
     if len(units) < len(result.joints):
-        result.notes.append("effort: torque or current is not said; state effort_gain, N m per recorded unit")
+        said_in = " or ".join(dict.fromkeys("N" if robot.prismatic[k] else "N m" for k in result.joints))
+        result.notes.append(f"effort: torque or current is not said; state effort_gain, {said_in} per recorded unit")
     elif any(unit in DRIVE for unit in units.values()):
         result.notes.append("effort: no torque but what the drive reports; effort_gain is 1 until you state it")
     result.signals["effort"] = _with(effort, units, "joint")

@@ -237,7 +237,7 @@ def _numbered(text: str, body: int) -> str:
     return text.replace("I", f"I{body}") if "I" in text else f"{text}{body}"
 
 
-def _length_scale(robot: Robot) -> float:
+def size_of(robot: Robot) -> float:
     """Size of the arm, so that thresholds do not depend on the unit of length."""
     offsets = [float(np.linalg.norm(robot.model.jointPlacements[int(k) + 1].translation)) for k in robot.order]
     strokes = robot.upper[robot.prismatic] - robot.lower[robot.prismatic]
@@ -247,7 +247,7 @@ def _length_scale(robot: Robot) -> float:
 
 def _parameter_scale(robot: Robot) -> Array:
     """Factors on the columns that go with one kilogram at the arm's length, shape (11 n,)."""
-    length = _length_scale(robot)
+    length = size_of(robot)
     body = [1.0, *(length,) * 3, *(length**2,) * 6]
     return np.concatenate([np.tile(body, robot.n), np.where(robot.prismatic, 1.0, length**2)])
 
@@ -255,7 +255,7 @@ def _parameter_scale(robot: Robot) -> Array:
 def _random_columns(robot: Robot, seed: int) -> Array:
     """Stack the standard regressor of random states that move gravity, speed and acceleration alike."""
     rng = np.random.default_rng(seed)
-    n, length = robot.n, _length_scale(robot)
+    n, length = robot.n, size_of(robot)
     samples = min(max(FEWEST_STATES, 44 * n), MOST_STATES)
     gravity = float(np.linalg.norm(robot.model.gravity.linear))
     rate = np.sqrt((gravity if gravity > 0.0 else 9.81) / length)

@@ -162,9 +162,11 @@ def margins(robot: Robot, limits: JointLimits, drives: Sequence[Drive]) -> tuple
                 continue
             left = bound - np.abs(signal) if side == 0.0 else side * (bound - signal)
             k = int(np.argmin(left))
-            share: float | None = float(abs(signal[k]) / bound)
-            if side != 0.0:
-                share = float(max(0.0, 1.0 - left[k] / half)) if np.isfinite(half) else None
+            share: float | None = None
+            if side == 0.0:
+                share = float(abs(signal[k]) / bound)
+            elif np.isfinite(half):
+                share = float(max(0.0, 1.0 - left[k] / half))
             allowed = TOLERANCE * (abs(bound) if side == 0.0 else half if np.isfinite(half) else 0.0)
             beyond = tuple((float(time[i]), float(time[m - 1])) for i, m in runs_of(left < -allowed))
             found.append(

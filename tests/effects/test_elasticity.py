@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from scara_ident.effects.two_mass import TwoMasses, usual_coupling
 from scara_ident.model.model import build_model
 from scara_ident.robot.robot import load_robot
 from scara_ident.simulation import parse_effect, simulate, virtual_arm
-from tests.arms import Array, example_urdf
+from tests.arms import Array, Link, example_urdf, write_urdf
 from tests.effects.scenes import columns, fit, moving, scene_of, wandering
 
 
@@ -146,3 +147,17 @@ def test_what_is_not_found_is_stiffer_than_is_seen_and_shares_inertia():
     assert other.joint == 2 and other.nonlinear[0] > scene.band
     beside = replace(scene, together=((family, Member(1, (4.0, 0.03))), (family, Member(2, (9.0, 0.1)))))
     assert 2 not in {item.joint for item in family.unfound(beside, Member(1, (4.0, 0.03)))}
+
+
+@pytest.mark.parametrize("travel", [0.05, 5.0])
+def test_clearances_of_a_slide_are_shares_of_its_travel(tmp_path: Path, travel: float):
+    robot = load_robot(write_urdf(tmp_path / "arm.urdf", [Link("prismatic")]))
+    scene = replace(scene_of(robot), travel=np.array([travel]))
+    widths = np.array([member.nonlinear[0] for member in Backlash().members(scene)])
+    # From a micrometre of a stage of some centimetres to what anybody feels; refinement bridges a factor of three.
+    assert widths[0] < 5e-6 * travel and widths[-1] > 5e-3 * travel and np.max(widths[1:] / widths[:-1]) < 3.0
+    ((lower, upper),) = Backlash().limits(scene, Member(0, (widths[0],)))
+    assert lower <= widths[0] and widths[-1] < upper
+    std = np.array([1e-9])
+    assert Backlash().inadmissible(scene, Member(0, (1e-3,)), np.array([0.01 * travel]), std) is None
+    assert "m would rattle" in str(Backlash().inadmissible(scene, Member(0, (1e-3,)), np.array([0.02 * travel]), std))

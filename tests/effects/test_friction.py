@@ -22,6 +22,7 @@ from scara_ident.model.terms import Friction
 from scara_ident.robot.robot import load_robot
 from scara_ident.simulation import effects as fx
 from scara_ident.simulation import simulate, virtual_arm
+from tests.arms import Link, write_urdf
 from tests.effects.scenes import columns, fit, moving, scene_of, wandering
 from tests.effects.simulated import ARMS, arm_of, run, true_motion, true_scene
 from tests.simulation.made import left_over
@@ -176,3 +177,19 @@ def test_the_other_law_falls_by_the_speed_itself_and_is_told_as_such():
     assert Stribeck().law() == {}
     assert other.law()["exponent"].value == 1.0
     assert other.description(scene, member).startswith(Stribeck().description(scene, member) + ", as exp(-|v|")
+
+
+@pytest.mark.parametrize("speed", [1e-3, 2.0])
+def test_speeds_at_which_friction_falls_are_shares_of_what_a_slide_reaches(tmp_path: Path, speed: float):
+    robot = load_robot(write_urdf(tmp_path / "arm.urdf", [Link("prismatic")]))
+    scene = replace(scene_of(robot), speed=np.array([speed]))
+    tried = [member.nonlinear[0] for member in Stribeck().members(scene)]
+    ((lower, upper),) = Stribeck().limits(scene, Member(0, (tried[0],)))
+    assert lower < 0.1 * min(tried) and 2.0 * max(tried) < upper
+
+
+def test_the_phase_of_a_slide_is_said_to_be_of_which_period(tmp_path: Path):
+    robot = load_robot(write_urdf(tmp_path / "arm.urdf", [Link("prismatic"), Link()]))
+    scene = replace(scene_of(robot), travel=np.array([0.6, 2.0]))
+    assert "period of 1.2 m" in PositionDependentFriction().description(scene, Member(0))
+    assert "period" not in PositionDependentFriction().description(scene, Member(1))

@@ -8,15 +8,24 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
+import yaml
 
 from scara_ident.effects import Member
 from scara_ident.effects.links import point_mass, tool_of
-from scara_ident.effects.payload import FreePayloadChange, GravityCounterbalance, PayloadChange, PayloadOfRecordings
+from scara_ident.effects.payload import (
+    BODY_COLUMN_SHARE,
+    BODY_COLUMNS,
+    FreePayloadChange,
+    GravityCounterbalance,
+    PayloadChange,
+    PayloadOfRecordings,
+    shown_of,
+)
 from scara_ident.effects.periodic import TorqueRipple
 from scara_ident.model.base_parameters import BODY_PARAMETERS
 from scara_ident.model.model import build_model
 from scara_ident.robot.robot import Robot, load_robot
-from tests.arms import PLANAR_2R, example_urdf, recorded_torque, recording, rnea, sines, write_urdf
+from tests.arms import PLANAR_2R, Link, example_urdf, recorded_torque, recording, rnea, sines, write_urdf
 from tests.effects.intervals import RATE, arms, run, seen
 from tests.effects.scenes import columns, fit, moving, scene_of
 from tests.simulation.made import tree
@@ -225,3 +234,23 @@ def test_a_counterbalance_without_a_gear_has_a_ripple_of_its_columns(tmp_path: P
     )
     geared = scene_of(replace(scene.robot, reduction=np.array([100.0, -100.0])))
     assert GravityCounterbalance().same_columns(geared, Member(1)) == ()
+
+
+@pytest.mark.parametrize("metre", [0.02, 50.0])
+def test_what_a_torque_tells_of_a_payload_does_not_depend_on_the_unit_of_length(tmp_path: Path, metre: float):
+    """The same arm with lengths in another unit; forces and gravity with them."""
+    found = []
+    for unit in (1.0, metre):
+        links = [
+            Link(com=(0.2 * unit, 0.0, 0.0), xyz=(0.0, 0.0, 0.3 * unit)),
+            Link(com=(0.1 * unit, 0.0, 0.0), xyz=(0.4 * unit, 0.0, 0.0)),
+            Link("prismatic", com=(0.0, 0.0, 0.0), xyz=(0.3 * unit, 0.0, 0.0)),
+        ]
+        path = write_urdf(tmp_path / f"{unit}.urdf", links)
+        path.write_text(path.read_text().replace('lower="-3" upper="3"', f'lower="0" upper="{0.2 * unit}"'))
+        description = {"urdf": str(path), "effort_side": "joint", "joints": {"j1": {}, "j2": {}, "j3": {}}}
+        text = yaml.safe_dump(description | {"gravity": [0.0, 0.0, -9.81 * unit]}, sort_keys=False)
+        (tmp_path / "robot.yaml").write_text(text)
+        robot = load_robot(tmp_path / "robot.yaml")
+        found.append((shown_of(robot), shown_of(robot, BODY_COLUMNS, BODY_COLUMN_SHARE)))
+    assert found[0] == found[1]

@@ -16,6 +16,7 @@ from scara_ident.motion.motion import Motion
 from scara_ident.robot.robot import load_robot
 from scara_ident.simulation import effects as fx
 from scara_ident.simulation import simulate, virtual_arm
+from tests.arms import Link, write_urdf
 from tests.effects.scenes import columns, fit, moving, scene_of, wandering
 from tests.effects.simulated import ARMS, arm_of, run, true_motion, true_scene
 from tests.simulation.made import left_over
@@ -168,3 +169,13 @@ def test_parameters_are_recovered_from_noisy_closed_loop_recordings(switch, effe
         true = getattr(runs[0].effects[0], name)
         assert abs(found.value - true) < 4.0 * found.std + 0.01 * abs(true), name
         assert found.std < 0.2 * abs(true), name
+
+
+@pytest.mark.parametrize("reduction", [1.0, 314.0])
+def test_a_slide_turns_no_motor_unless_its_reduction_is_stated(tmp_path: Path, reduction: float):
+    robot = load_robot(write_urdf(tmp_path / "arm.urdf", [Link("prismatic")], [reduction]))
+    # Twenty metres are three turns of 2 pi metres.
+    scene = replace(scene_of(robot), travel=np.array([20.0]), speed=np.array([0.1]))
+    line = SpectralLine("order", 3.0)
+    for effect in (TorqueRipple(), EncoderEccentricity()):
+        assert bool(effect.members(scene)) == bool(effect.seeds(scene, 0, line)) == (reduction != 1.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,11 +11,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from scara_ident.effects import Member
-from scara_ident.effects.presliding import DISTANCES, SMALLEST_REVERSAL_SHARE, Presliding, dahl_state, turning_points
+from scara_ident.effects.presliding import (
+    DISTANCES,
+    SLIDE_DISTANCES,
+    SMALLEST_REVERSAL_SHARE,
+    Presliding,
+    dahl_state,
+    turning_points,
+)
 from scara_ident.model.model import build_model
 from scara_ident.robot.robot import load_robot
 from scara_ident.simulation import effects as fx
 from scara_ident.simulation import simulate, virtual_arm
+from tests.arms import Link, write_urdf
 from tests.effects.scenes import columns, fit, scene_of, wandering
 from tests.effects.simulated import ARMS, arm_of, run, true_motion, true_scene
 
@@ -101,3 +110,16 @@ def test_the_coulomb_friction_is_recovered_and_the_distance_fits_best():
         if distance == 0.008:
             assert found[0] == pytest.approx(arm.friction[1, 0], rel=0.03)
     assert max(value, key=lambda key: value[key]) == 0.008
+
+
+@pytest.mark.parametrize("travel", [0.004, 0.4, 40.0])
+def test_distances_of_a_slide_are_shares_of_its_travel_whatever_a_metre_is(tmp_path: Path, travel: float):
+    robot = load_robot(write_urdf(tmp_path / "arm.urdf", [Link("prismatic")]))
+    scene = replace(scene_of(robot), travel=np.array([max(travel, 0.01)]))
+    tried = np.array([member.nonlinear[0] for member in Presliding().members(scene)])
+    assert tried / scene.travel[0] == pytest.approx(np.array(SLIDE_DISTANCES) / np.pi)
+    ((lower, upper),) = Presliding().limits(scene, Member(0, (tried[0],)))
+    assert lower < tried.min() and tried.max() < upper
+    # What is known of friction is in newtons, and is none here.
+    long = Presliding().inadmissible(scene, Member(0, (0.2 * scene.travel[0],)), np.ones(1), np.ones(1))
+    assert "spring" in str(long)

@@ -9,7 +9,7 @@ import pytest
 
 from scara_ident.effects import Signals
 from scara_ident.robot.robot import load_robot
-from tests.arms import example_urdf, rnea
+from tests.arms import Link, example_urdf, rnea, write_urdf
 from tests.effects.carried import carrying, heavier
 from tests.effects.scenes import moving, scene_of
 
@@ -76,3 +76,10 @@ def test_signals_at_another_estimate_of_what_acts_on_links_have_another_load():
     # Another armature leaves it as it is.
     assert first.at(replace(scene, armatures={0: 1.0})).on_links is first.on_links
     assert other.load(1) == pytest.approx(load + first.on_links[1], abs=1e-9)
+
+
+def test_a_length_goes_by_what_a_slide_travels_and_by_its_range_where_it_stands_still(tmp_path):
+    robot = load_robot(write_urdf(tmp_path / "arm.urdf", [Link(), Link("prismatic"), Link("prismatic")]))
+    scene = replace(scene_of(robot), travel=np.array([2.0, 0.05, 1e-6]))
+    # The limits of these arms are 3 m to either side.
+    assert scene.radian == pytest.approx([1.0, 0.05 / np.pi, 6.0 / np.pi])

@@ -61,6 +61,13 @@ def test_an_endless_joint_has_no_share(known: IdentifiedModel):
     assert (broken.share, broken.kept, broken.excess) == (None, False, np.inf)
 
 
+@pytest.mark.filterwarnings("error")
+def test_a_range_that_begins_at_zero_is_as_any_other(known: IdentifiedModel):
+    limits = replace(joint_limits(known.robot), lower=np.array([0.0, -1.0]), upper=np.array([2.0, 1.0]))
+    found = {each.name: each for each in margins(known.robot, limits, [moved(known)])}
+    assert found["joint1.position.lower"].share == pytest.approx(1.3)
+
+
 @pytest.mark.parametrize(
     ("given", "said"),
     [
