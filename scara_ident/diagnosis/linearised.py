@@ -106,6 +106,10 @@ class Linearised:
             rows[row, -1] = weight * (item.nominal - item.value)
         return merge([Information(rows, 0.0), self.ties])
 
+    def gain(self, way: Array) -> float:
+        """Return the share of the squared residual that parameters as `solve` returns them promise to remove."""
+        return 1.0 - self.information.residual_sum(way) / (self.variance * self.rows)
+
     def solve(self, damping: float = 0.0) -> tuple[Array, Array]:
         """Return the best parameters, nonlinear ones as a change, and the white standard deviations of all.
 

@@ -1,4 +1,8 @@
-"""Fitting the nonlinear parameters of all effects in a model together, by steps of Gauss and Newton that may be held back."""
+"""Fitting the nonlinear parameters of all effects in a model together, by steps that are held back where they led too far.
+
+The method is that of Levenberg (Quarterly of Applied Mathematics 2, 1944) and Marquardt (J. SIAM 11, 1963); what linear parameters
+take up is no part of what holds a step back (Golub and Pereyra, SIAM J. Numerical Analysis 10, 1973).
+"""
 
 from __future__ import annotations
 
@@ -55,11 +59,11 @@ def tune(step: SelectionStep, *, coarse: bool = False) -> SelectionStep:
                 break
             way = best.solve(damping)[0]
         else:
-            # Where the way is longer than a step may be, how little one gains says nothing of the whole.
-            near = coarse and share == 1.0
+            way, std = now.solve()
+            # Where the way is longer than a step may be, how little one gains says nothing of the whole, of which the model does.
+            near = coarse and (share == 1.0 or now.gain(way) < LEAST_FALL)
             arrived = near and best is not None and best.error - now.error < LEAST_FALL * best.error
             best = now
-            way, std = now.solve()
             if np.all(_to_go(now, way, settling) <= SETTLED * np.concatenate([std[settling], std[now.linear :]])):
                 if _share(now, way) < 1.0:
                     break

@@ -37,9 +37,10 @@ BOTH_SIDES = 1.5
 LEAST_COUPLING = 0.2
 # With less damping than this two gears are not fitted from a guess: the phase after a few swings would be anything.
 STEADY_DAMPING = 0.05
-# Clearances tried, rad at the joint: three times apart, which refinement bridges. Of a joint that slides more, as multiples of
-# `Scene.radian`: a nut on its screw or a pinion has micrometres to millimetres, of a travel of millimetres to metres.
+# Clearances tried, rad at the joint: three times apart, which refinement bridges.
 WIDTHS = (3e-4, 1e-3, 3e-3)
+# Of a joint that slides more, as multiples of `Scene.radian`: a nut on its screw or a pinion has micrometres to millimetres, of
+# a travel of millimetres to metres.
 SLIDE_WIDTHS = (1e-5, 2.7e-5, 7.4e-5, 2e-4, 5.5e-4, 1.5e-3, 4e-3, 0.011, 0.03)
 # The motion that is known within a band rounds off the blow of a landing: recordings without noise give a width that is up to
 # twice this share too small.

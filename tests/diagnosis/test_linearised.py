@@ -102,5 +102,11 @@ def test_a_step_that_is_held_back_is_the_best_of_that_penalty_and_linear_paramet
     assert found[state.linear :] == pytest.approx(best, rel=1e-5)
     given = np.linalg.lstsq(own, rows[:, -1] - theirs @ best, rcond=1e-9)[0]
     assert own @ found[: state.linear] == pytest.approx(own @ given, abs=1e-7 * np.max(np.abs(rows[:, -1])))
-    whole = state.solve()[0][state.linear :]
+    way = state.solve()[0]
+    whole = way[state.linear :]
+    # By dense rows.
+    size = np.repeat(WEIGHTS, [rows.table.shape[1] for rows in state.joints])
+    after = size * (np.concatenate([rows.table[-1] for rows in state.joints]) - dense(state) @ way)
+    assert state.gain(way) == pytest.approx(1.0 - np.mean(after**2) / state.variance, abs=1e-9)
+    assert state.gain(way) > 0.0
     assert np.linalg.norm(beside @ best) < np.linalg.norm(beside @ whole)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -315,3 +316,34 @@ def test_a_freed_model_leaves_nothing_that_its_nonlinear_parameters_could_take_u
     best = float(np.sum(fitted.model.squares))
     assert held > 1.05 * best
     assert freed < best + 0.3 * (held - best)
+
+
+def test_a_coarse_fit_goes_on_where_a_step_was_cut_short_that_the_model_promises_more_of(monkeypatch) -> None:
+    """One of two gears stayed near a damping ratio of 0.3 that it passed on its way to 0.02, and was refused there."""
+    errors, promised = iter([100.0, 99.5, 99.0, 98.9]), iter([0.5, 0.5, 0.01, 0.0])
+    seen = []
+
+    class State:
+        linear, unknowns, chosen, scene, value = 0, (), (), None, np.zeros(0)
+
+        def __init__(self) -> None:
+            self.error = next(errors)
+            self.promised = next(promised)
+            seen.append(self)
+
+        def solve(self, damping: float = 0.0):
+            return np.zeros(0), np.zeros(0)
+
+        def gain(self, way) -> float:
+            return self.promised
+
+    module = sys.modules[tune.__module__]
+    step = step_beside(exact_runs(), [Candidate(Spring(), Member(1))])
+    monkeypatch.setattr(module, "linearise", lambda step: State())
+    monkeypatch.setattr(module, "_to_go", lambda *_: np.ones(1))
+    monkeypatch.setattr(module, "_settling", lambda step: np.zeros(0, dtype=np.intp))
+    monkeypatch.setattr(module, "_share", lambda *_: 0.5)
+    monkeypatch.setattr(module, "_moved", lambda step, *_: step)
+    monkeypatch.setattr(module, "at_estimate", lambda *_: step.scene)
+    tune(step, coarse=True)
+    assert [item.error for item in seen] == [100.0, 99.5, 99.0]

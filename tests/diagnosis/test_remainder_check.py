@@ -43,7 +43,7 @@ def diagnosed(effects: list[str], samples: int) -> Diagnosis:
 
 @pytest.fixture(scope="module")
 def rigid() -> Diagnosis:
-    return diagnosed([], 24)
+    return diagnosed([], 20)
 
 
 @pytest.fixture(scope="module")
@@ -52,18 +52,18 @@ def soft() -> Diagnosis:
 
 
 def test_a_mean_of_the_positions_is_a_delay_and_no_elastic_gear(rigid: Diagnosis):
-    """Stiffness of joint1 21500 ± 1600 N m/rad, of a rigid arm whose positions were means over 80 ms."""
+    """Stiffness of joint1 21500 ± 1600 N m/rad, of a rigid arm whose positions are means over 80 ms."""
     (delay,) = rigid.effects
     assert (delay.effect, delay.joint) == ("time_delay", None)
     # Half of its length, less half a sample.
-    assert delay.parameters["delay"].value == pytest.approx(-23 / 2 / RATE, abs=0.5 / RATE)
+    assert delay.parameters["delay"].value == pytest.approx(-19 / 2 / RATE, abs=0.5 / RATE)
     (why,) = (item.why for item in rigid.tentative if item.joint == "joint1")
     assert why.startswith("a filter of all positions before they were recorded does as well in its place")
 
 
 def test_no_band_is_asked_for_that_the_filter_has_emptied(rigid: Diagnosis):
-    # A mean over 96 ms keeps nothing at 10.4 Hz, and 76 % at a fifth over its delay.
-    assert max(band or np.inf for band in rigid.search.bands) <= 0.21 / (23 / 2 / RATE)
+    # A mean over 80 ms keeps nothing at 12.5 Hz, and 76 % at a fifth over its delay.
+    assert max(band or np.inf for band in rigid.search.bands) <= 0.21 / (19 / 2 / RATE)
 
 
 def test_an_elastic_gear_beside_a_filter_of_the_positions_is_found(soft: Diagnosis):
