@@ -332,7 +332,7 @@ def test_a_coarse_fit_goes_on_where_a_step_was_cut_short_that_the_model_promises
             seen.append(self)
 
         def solve(self, damping: float = 0.0):
-            return np.zeros(0), np.zeros(0)
+            return np.zeros(1), np.zeros(1)
 
         def gain(self, way) -> float:
             return self.promised
