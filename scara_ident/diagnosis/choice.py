@@ -171,9 +171,9 @@ def _each_fitted(
 
 
 def _least_left(found: Sequence[tuple[SelectionStep, Decision]]) -> list[tuple[SelectionStep, Decision]]:
-    """Return of several fits of the same effects the one that leaves the least, which the last gains by beside the others least.
+    """Return of several fits of the same effects the one that leaves the least.
 
-    Beside others in a wrong minimum it may gain all.
+    What the last gains beside the others does not say which: beside others in a wrong minimum it may gain all.
     """
     best: dict[frozenset[str], tuple[SelectionStep, Decision]] = {}
     for own, decision in found:
