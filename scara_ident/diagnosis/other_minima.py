@@ -8,7 +8,7 @@ too small to be found is taken up by what was.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from scara_ident.diagnosis.effect_parameters import physical_parameters
 from scara_ident.diagnosis.exchange import same
 from scara_ident.diagnosis.linearised import linearise
 from scara_ident.diagnosis.nonlinear_fit import LEAST_FALL, RISE, tune
+from scara_ident.diagnosis.part_of_recordings import on_all, on_part
 from scara_ident.diagnosis.selection_step import SelectionStep
 from scara_ident.effects import Parameter
 from scara_ident.errors import RecordingError
@@ -25,6 +26,20 @@ from scara_ident.estimation.run_offsets import offsets_on
 
 # A fit that leaves so many times as much is no rival, whatever rows will weigh in the end.
 RIVAL = 2.0
+# Fits whose nonlinear parameters differ by no larger share ended in the same minimum: so near do coarse ones come to it.
+SAME = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """A fit, and the squared error that it leaves."""
+
+    step: SelectionStep
+    error: float
+
+    def near(self, other: _Fit) -> bool:
+        """Whether it may come down to the error of another fit."""
+        return self.error < (1.0 + LEAST_FALL) * other.error
 
 
 def lowest(step: SelectionStep) -> SelectionStep:
@@ -32,18 +47,15 @@ def lowest(step: SelectionStep) -> SelectionStep:
 
     Each of them in turn begins as `Effect.elsewhere` has it, the others where the first fit ended.
     """
-    best = tune(step)
-    if len(_together(best)) < 2:
-        return best
-    ends = _from_elsewhere(replace(best, minima=()))
-    near = _near(best, ends)
-    if near:
-        other = tune(near[0])
-        if linearise(other).error < (1.0 - RISE) * linearise(best).error:
-            best, ends = other, [best, *(each for each in ends if each is not near[0])]
-    most = RIVAL * linearise(best).error
-    rivals = [each for each in ends if linearise(each).error < most]
-    return replace(best, minima=tuple(_acting(each) for each in (best, *rivals)))
+    best = _fitted(step)
+    if len(_together(best.step)) < 2:
+        return best.step
+    rivals = _rivals(replace(best, step=replace(best.step, minima=())))
+    if rivals and rivals[0].near(best):
+        other = _fitted(rivals[0].step)
+        if other.error < (1.0 - RISE) * best.error:
+            best, rivals = other, [each for each in (best, *rivals[1:]) if each.error < RIVAL * other.error]
+    return replace(best.step, minima=tuple(_acting(each.step) for each in (best, *rivals)))
 
 
 def as_good(step: SelectionStep) -> Iterator[SelectionStep]:
@@ -56,7 +68,8 @@ def as_good(step: SelectionStep) -> Iterator[SelectionStep]:
     if not places:
         return
     if len(places) > 1:
-        yield from (other for other in _near(step, _from_elsewhere(step)) if _alike(step, other, places))
+        own = _Fit(step, linearise(step).error)
+        yield from (each.step for each in _rivals(own) if each.near(own) and _alike(step, each.step, places))
         below = _below(step)
         if below is not None and _others(step, below, places):
             yield below
@@ -75,16 +88,33 @@ def _acting(step: SelectionStep) -> tuple[Candidate, ...]:
     return tuple(step.chosen[place] for place in _together(step))
 
 
-def _near(step: SelectionStep, fits: Sequence[SelectionStep]) -> list[SelectionStep]:
-    """Return the coarse fits that may come down to the error of a step, the best first."""
-    enough = (1.0 + LEAST_FALL) * linearise(step).error
-    errors = [linearise(each).error for each in fits]
-    return [fits[k] for k in np.argsort(errors) if errors[k] < enough]
+def _fitted(step: SelectionStep, *, coarse: bool = False) -> _Fit:
+    found = tune(step, coarse=coarse)
+    return _Fit(found, linearise(found).error)
 
 
-def _from_elsewhere(step: SelectionStep) -> list[SelectionStep]:
-    """Return coarse fits that began with one of several effects elsewhere, or where those of the same effects ended."""
-    return [tune(begun, coarse=True) for begun in (_at_rivals(step) if _of_these(step) else _elsewhere(step))]
+def _rivals(own: _Fit) -> list[_Fit]:
+    """Return other coarse fits that leave not much more than one's own, the best first.
+
+    They began with one of several effects elsewhere, or where those of the same effects ended.
+    """
+    step = own.step
+    if _of_these(step):
+        found = [_fitted(begun, coarse=True) for begun in _at_rivals(step)]
+    else:
+        part = on_part(step)
+        ends = [tune(begun, coarse=True) for begun in _elsewhere(part)]
+        found = [_Fit(end, linearise(end).error) for end in (on_all(end, step) for end in ends)]
+        if part is not step:
+            found = [_fitted(each.step, coarse=True) for each in found if each.error < RIVAL * own.error]
+    found = [each for each in found if each.error < RIVAL * own.error and not _same(each.step, step)]
+    return sorted(found, key=lambda each: each.error)
+
+
+def _same(one: SelectionStep, other: SelectionStep) -> bool:
+    """Whether two fits of the same effects ended in the same minimum, as near as coarse fits come."""
+    pairs = zip(_acting(one), _acting(other), strict=True)
+    return all(np.allclose(mine.member.nonlinear, its.member.nonlinear, rtol=SAME, atol=0.0) for mine, its in pairs)
 
 
 def _of_these(step: SelectionStep) -> bool:

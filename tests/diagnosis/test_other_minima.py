@@ -78,10 +78,11 @@ def test_a_fit_that_ended_in_another_minimum_ends_in_the_lowest():
 
 def test_fits_begin_where_those_of_the_same_effects_ended(monkeypatch: pytest.MonkeyPatch):
     step = step_beside(exact_runs(), [Candidate(FAMILY, Member(j, (9.0 - j, 0.1))) for j in (0, 1)])
-    begun = []
+    begun, recordings = [], []
 
     def tuned(step: SelectionStep, **_: bool) -> SelectionStep:
         begun.append([item.member.nonlinear[0] for item in step.chosen])
+        recordings.append(len(step.observations.data.recordings))
         return step
 
     def error(step: SelectionStep) -> SimpleNamespace:
@@ -92,10 +93,12 @@ def test_fits_begin_where_those_of_the_same_effects_ended(monkeypatch: pytest.Mo
     monkeypatch.setattr(module, "tune", tuned)
     monkeypatch.setattr(module, "linearise", error)
     best = lowest(step)
-    assert begun == [[9.0, 8.0], [5.625, 8.0], [14.4, 8.0], [9.0, 5.0], [9.0, 12.8]]
-    # Those that leave twice as much are no rivals.
+    assert begun[:5] == [[9.0, 8.0], [5.625, 8.0], [14.4, 8.0], [9.0, 5.0], [9.0, 12.8]]
+    # Those that leave twice as much are no rivals; the others are fitted to all recordings too.
     rivals = [[item.member.nonlinear[0] for item in each] for each in best.minima]
     assert rivals == [[9.0, 8.0], [14.4, 8.0], [9.0, 5.0]]
+    assert begun[5:] == rivals[1:]
+    assert recordings[0] == 4 and max(recordings[1:5]) < 4 and recordings[5:] == [4, 4]
     monkeypatch.setattr(module, "_below", lambda _: None)
     begun.clear()
     assert list(as_good(best)) == []
@@ -114,7 +117,7 @@ def test_what_differs_in_the_lower_part_of_the_band_is_in_the_standard_deviation
     own = physical_parameters(step).effects[1]["stiffness"]
     softer = replace(step, chosen=(step.chosen[0], step.chosen[1].at((6.0, 0.03))))
     module = sys.modules[lowest.__module__]
-    monkeypatch.setattr(module, "_from_elsewhere", lambda _: [])
+    monkeypatch.setattr(module, "_rivals", lambda _: [])
     for below, far in ((softer, True), (step, False), (None, False)):
         monkeypatch.setattr(module, "_below", lambda _, below=below: below)
         told = parameters_of_laws(step).effects[1]["stiffness"]
@@ -130,3 +133,20 @@ def test_what_one_takes_up_of_another_that_was_not_found_is_in_its_standard_devi
     assert abs(own["stiffness"].value - 6000.0) > 5.0 * own["stiffness"].std
     assert told["stiffness"].value == own["stiffness"].value
     assert abs(told["stiffness"].value - 6000.0) < 2.0 * told["stiffness"].std
+
+
+def test_what_ended_in_the_same_minimum_is_no_rival(monkeypatch: pytest.MonkeyPatch):
+    step = step_beside(exact_runs(1, 1), [Candidate(FAMILY, Member(j, (9.0 - j, 0.1))) for j in (0, 1)])
+
+    def tuned(step: SelectionStep, **_: bool) -> SelectionStep:
+        # Whatever began faster comes back, all but a little.
+        first, second = step.chosen
+        return replace(step, chosen=(first.at([9.1, 0.098]), second)) if first.member.nonlinear[0] > 10.0 else step
+
+    module = sys.modules[lowest.__module__]
+    monkeypatch.setattr(module, "tune", tuned)
+    monkeypatch.setattr(module, "linearise", lambda _: SimpleNamespace(error=10.0))
+    best = lowest(step)
+    assert [[item.member.nonlinear[0] for item in each] for each in best.minima] == [
+        [9.0, 8.0], [5.625, 8.0], [9.0, 5.0], [9.0, 12.8]
+    ]  # fmt: skip
