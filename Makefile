@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: demo check test style lint types compiled fast unit bench clean
+.PHONY: demo check test lint types compiled fast unit bench clean
 
 demo: $(STAMP)
 	$(BIN)/scara-ident demo --output demo-output
@@ -12,11 +12,10 @@ demo: $(STAMP)
 # While working: three minutes. Before a change lands: everything.
 check: lint types fast
 
+# Types are checked beside the tests: alone they would leave a core idle for most of a minute.
 test: $(STAMP)
-	$(MAKE) --no-print-directory -j 2 style compiled
-	$(MAKE) --no-print-directory unit
-
-style: lint types
+	$(MAKE) --no-print-directory -j 2 lint compiled
+	$(MAKE) --no-print-directory -j 2 types unit
 
 lint: $(STAMP)
 	$(BIN)/ruff check .

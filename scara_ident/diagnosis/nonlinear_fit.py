@@ -20,6 +20,9 @@ from scara_ident.diagnosis.selection_step import SelectionStep
 ROUNDS, TIED_ROUNDS = 6, 24
 # Standard deviations: a step that is shorter for every parameter is the last.
 SETTLED = 0.1
+# Residual variances of a row: where the linear model promises no more, no parameter is further than a fifth of its standard deviation
+# from where it leads, and where gears meet their stops the error is no smoother than that.
+NOTHING = 0.04
 # A rise of the squared error by more than this share turns a step back; loads that settle may raise it by less.
 RISE = 1e-5
 # A step that lowers the squared error by a smaller share is the last of a coarse fit.
@@ -64,7 +67,7 @@ def tune(step: SelectionStep, *, coarse: bool = False) -> SelectionStep:
             near = coarse and (share == 1.0 or now.gain(way) < LEAST_FALL)
             arrived = near and best is not None and best.error - now.error < LEAST_FALL * best.error
             best = now
-            if np.all(_to_go(now, way, settling) <= SETTLED * np.concatenate([std[settling], std[now.linear :]])):
+            if _settled(now, way, std, settling):
                 if _share(now, way) < 1.0:
                     break
                 # So short a step needs no look at where it leads.
@@ -82,11 +85,17 @@ def tune(step: SelectionStep, *, coarse: bool = False) -> SelectionStep:
     return replace(step, scene=at_estimate(best.scene, best.chosen, best.value), chosen=best.chosen)
 
 
-def _to_go(state: Linearised, way: Array, settling: NDArray[np.intp]) -> Array:
-    """Return how far a way leads: of the linear parameters that columns follow, then of the nonlinear ones."""
-    linear = way[: state.linear] - estimate_of(state.scene, state.chosen)
+def _settled(state: Linearised, way: Array, std: Array, settling: NDArray[np.intp]) -> bool:
+    """Whether a way is so short that it needs no look at where it leads.
+
+    Linear parameters that columns follow are to be near; nonlinear ones each, or so that all of them together promise next to nothing.
+    """
+    linear = np.abs(way[: state.linear] - estimate_of(state.scene, state.chosen))
+    if np.any(linear[settling] > SETTLED * std[settling]):
+        return False
     changes = zip(state.unknowns, way[state.linear :], strict=True)
-    return np.asarray(np.abs(np.concatenate([linear[settling], [item.moved(x) - item.value for item, x in changes]])))
+    steps = np.array([abs(item.moved(x) - item.value) for item, x in changes])
+    return bool(np.all(steps <= SETTLED * std[state.linear :])) or state.gain(way) * state.rows <= NOTHING
 
 
 def _share(state: Linearised, way: Array) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,8 +14,9 @@ from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.effect_parameters import physical_parameters
 from scara_ident.diagnosis.linearised import Linearised, freed_model, linearise
-from scara_ident.diagnosis.nonlinear_fit import tune
+from scara_ident.diagnosis.nonlinear_fit import _settled, tune
 from scara_ident.diagnosis.selection_step import SelectionStep
+from scara_ident.diagnosis.unknowns import Unknown
 from scara_ident.effects import Member, effects_named
 from scara_ident.effects.elasticity import Backlash, JointElasticity
 from scara_ident.effects.friction import Stribeck
@@ -340,10 +342,30 @@ def test_a_coarse_fit_goes_on_where_a_step_was_cut_short_that_the_model_promises
     module = sys.modules[tune.__module__]
     step = step_beside(exact_runs(), [Candidate(Spring(), Member(1))])
     monkeypatch.setattr(module, "linearise", lambda step: State())
-    monkeypatch.setattr(module, "_to_go", lambda *_: np.ones(1))
+    monkeypatch.setattr(module, "_settled", lambda *_: False)
     monkeypatch.setattr(module, "_settling", lambda step: np.zeros(0, dtype=np.intp))
     monkeypatch.setattr(module, "_share", lambda *_: 0.5)
     monkeypatch.setattr(module, "_moved", lambda step, *_: step)
     monkeypatch.setattr(module, "at_estimate", lambda *_: step.scene)
     tune(step, coarse=True)
     assert [item.error for item in seen] == [100.0, 99.5, 99.0]
+
+
+@pytest.mark.parametrize(
+    ("load", "step", "promised", "settled"),
+    [(0.0, 0.05, 0.5, True), (0.0, 0.15, 0.03, True), (0.0, 0.15, 0.05, False), (0.2, 0.05, 0.03, False)],
+)
+def test_a_way_is_short_by_its_parameters_or_by_what_it_promises(
+    load: float, step: float, promised: float, settled: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where gears meet their stops the error is not smooth: a fit went on for 24 rounds that had settled in four."""
+    monkeypatch.setattr(sys.modules[tune.__module__], "estimate_of", lambda *_: np.zeros(1))
+    state = SimpleNamespace(
+        linear=1,
+        unknowns=[Unknown(0, 0, 1.0, 0.0, 10.0)],
+        scene=None,
+        chosen=(),
+        rows=100,
+        gain=lambda _: promised / 100.0,
+    )
+    assert _settled(state, np.array([load, step]), np.ones(2), np.arange(1)) is settled
