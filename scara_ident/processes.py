@@ -15,7 +15,7 @@ from multiprocessing.connection import Connection, wait
 from typing import Any, TypeVar
 
 from scara_ident.errors import ScaraIdentError
-from scara_ident.threads import one_blas_thread, one_thread, works_alone
+from scara_ident.threads import available_cores, one_blas_thread, one_thread, works_alone
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -24,11 +24,6 @@ Result = TypeVar("Result")
 AHEAD = 2
 # Threads begin without it.
 _OWN: ContextVar[bool] = ContextVar("own process", default=False)
-
-
-def available_cores() -> int:
-    """Number of cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def map_in_order(

@@ -112,6 +112,11 @@ def one_thread() -> Iterator[None]:
             _LOCAL.beside = before
 
 
+def available_cores() -> int:
+    """Number of cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
 def works_alone() -> bool:
     """Whether what is done now is to be done one thing after the other, since others work beside it."""
     return bool(getattr(_LOCAL, "beside", False))
@@ -128,7 +133,7 @@ def side_by_side(function: Callable[..., T], *items: Iterable[Any]) -> list[T]:
     What such a function wants side by side itself is done one after the other: both threads are at work.
     """
     work = list(zip(*items, strict=False))
-    if len(work) < 2 or works_alone():
+    if len(work) < 2 or works_alone() or available_cores() < THREADS:
         with one_blas_thread():
             return [function(*arguments) for arguments in work]
     results: list[Any] = [None] * len(work)

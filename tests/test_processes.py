@@ -62,6 +62,7 @@ def test_no_more_cores_are_used_than_this_process_may(monkeypatch: pytest.Monkey
     assert set(map_in_order(lambda _: os.getpid(), range(3))) == {os.getpid()}
 
 
+@pytest.mark.usefixtures("two_cores")
 def test_what_is_done_beside_is_done_in_another_process_on_threads_of_its_own():
     def work() -> tuple[int, list[int]]:
         return os.getpid(), side_by_side(lambda x: x * x, range(5))
@@ -77,6 +78,7 @@ class Large:
     """What a task holds, whose memory is to be free once it is done."""
 
 
+@pytest.mark.usefixtures("two_cores")
 def test_a_worker_keeps_nothing_of_what_it_has_done():
     def work(item: int) -> bool:
         held = Large()
@@ -93,6 +95,7 @@ def test_a_worker_keeps_nothing_of_what_it_has_done():
         assert result()
 
 
+@pytest.mark.usefixtures("two_cores")
 def test_workers_beside_each_other_have_one_thread_each_and_one_alone_has_its_own_two():
     def work(_: int = 0) -> int:
         return len(set(side_by_side(lambda _: (time.sleep(0.01), threading.get_ident())[1], range(8))))

@@ -8,8 +8,11 @@ import threading
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
+from scara_ident import threads
 from scara_ident.threads import LONG, SOON, made_once, one_blas_thread, side_by_side, threads_for
 from tests.shared import PATIENCE
+
+pytestmark = pytest.mark.usefixtures("two_cores")
 
 
 def blas_threads() -> set[int]:
@@ -114,3 +117,8 @@ def test_what_is_made_once_is_made_for_two_instances_at_the_same_time():
     # A third time nobody would come to the barrier.
     assert slow[0].value == id(slow[0])
     assert Slow.value.__doc__ == "Return what both have to be at work for."
+
+
+def test_where_there_is_one_core_one_thread_does_all(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(threads, "available_cores", lambda: 1)
+    assert set(side_by_side(lambda _: threading.get_ident(), range(3))) == {threading.get_ident()}
