@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,32 +13,11 @@ from scara_ident.effects.measurement import TorqueGainMismatch
 from scara_ident.effects.scale_groups import scale_groups
 from scara_ident.model.model import build_model
 from scara_ident.robot.robot import Robot, load_robot
-from tests.arms import PLANAR_2R, Link, recorded_torque, recording, sines, write_urdf
+from tests.arms import ALONG, CYLINDRICAL, PLANAR_2R, UP, Link, in_unit, recorded_torque, recording, sines
 from tests.effects.scenes import scene_of
 
-UP, ALONG = (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)
-# A column that turns, a carriage that it lifts, and a ram that reaches out.
-CYLINDRICAL = (
-    Link(axis=UP, mass=40.0, com=(0.05, 0.0, 0.3), inertia=(4.0, 4.0, 0.6)),
-    Link("prismatic", axis=UP, mass=22.0, com=(0.1, 0.02, 0.0), inertia=(0.3, 0.4, 0.5)),
-    Link("prismatic", axis=ALONG, xyz=(0.2, 0.0, 0.0), mass=12.0, com=(-0.2, 0.0, 0.0), inertia=(0.02, 1.4, 1.4)),
-)
 SLIDES = tuple(Link("prismatic", axis=axis, mass=5.0) for axis in (ALONG, (0.0, 1.0, 0.0), UP))
 TURN = Link(axis=UP, xyz=(0.3, 0.0, 0.0))
-
-
-def in_unit(links: tuple[Link, ...], unit: float, folder: Path) -> Robot:
-    """Return an arm whose lengths are told in another unit, so many to the metre."""
-    scaled = [
-        replace(
-            link, xyz=tuple(unit * x for x in link.xyz), com=tuple(unit * x for x in link.com),
-            inertia=tuple(unit**2 * x for x in link.inertia),
-        )
-        for link in links
-    ]  # fmt: skip
-    write_urdf(folder / "arm.urdf", scaled)
-    (folder / "robot.yaml").write_text(f"urdf: arm.urdf\ngravity: [0, 0, {-9.81 * unit}]\n", encoding="utf-8")
-    return load_robot(folder / "robot.yaml")
 
 
 def per_joint(robot: Robot, unit: float) -> np.ndarray:
