@@ -78,7 +78,7 @@ class TorqueGainMismatch(Effect):
     """A torque scale that differs from that of the other joints: ``recorded = scale u``.
 
     A scale that is wrong for all joints alike goes into all parameters; what two joints' torques say of the parameters
-    that they share tells the ratio of their scales, weakly, and of joints that share none nothing does (`scale_groups`). The joints of
+    that they share tells the ratio of their scales, weakly, and of joints that share none, or rest, nothing does (`scale_groups`). The joints of
     which none is named agree with one another. ``ratio`` is the joint's scale over that of the first joint that it shares parameters
     with, whether or not that is found to differ too. Where it is, it is named itself, with the ratio of its scale to
     that of the joints that are not named. Where two joints share parameters nothing tells which is wrong: the second is named.
@@ -103,7 +103,7 @@ class TorqueGainMismatch(Effect):
 
     def joints(self, scene: Scene) -> list[int]:
         """Return all joints whose scale another's tells; of two the second, as either explains what the other does."""
-        groups = [group for group in scale_groups(scene.model.rigid_body) if len(group) > 1]
+        groups = [group for group in _groups(scene) if len(group) > 1]
         return sorted(j for group in groups for j in (group if len(group) > MOST_TO_DOUBT else group[1:]))
 
     def or_else(self, scene: Scene, member: Member, value: Array) -> str:
@@ -142,7 +142,11 @@ class TorqueGainMismatch(Effect):
 
 def _compared(scene: Scene, member: Member) -> tuple[int, ...]:
     """Return the joints whose scales are compared, that of a member among them."""
-    return next(group for group in scale_groups(scene.model.rigid_body) if member.place in group)
+    return next(group for group in _groups(scene) if member.place in group)
+
+
+def _groups(scene: Scene) -> tuple[tuple[int, ...], ...]:
+    return scale_groups(scene.model.rigid_body, tuple(scene.moving.tolist()))
 
 
 class TimeDelay(Effect):

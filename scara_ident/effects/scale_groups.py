@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -16,7 +17,7 @@ TOGETHER = 0.5
 
 
 @lru_cache(maxsize=16)
-def scale_groups(term: RigidBody) -> tuple[tuple[int, ...], ...]:
+def scale_groups(term: RigidBody, moving: tuple[bool, ...]) -> tuple[tuple[int, ...], ...]:
     """Return the joints whose torque scales rigid bodies compare, as groups in the order of their first joints.
 
     A scale that all joints of a group have goes into the bodies' parameters, and nothing compares it with those of others. So of two
@@ -25,6 +26,8 @@ def scale_groups(term: RigidBody) -> tuple[tuple[int, ...], ...]:
     Parameters
     ----------
     term : RigidBody
+    moving : tuple of bool
+        Which joints move; one that rests says nothing, and is alone.
 
     Notes
     -----
@@ -34,7 +37,9 @@ def scale_groups(term: RigidBody) -> tuple[tuple[int, ...], ...]:
     """
     robot = term.robot
     motion = random_motion(robot, np.random.default_rng(0), 20 + 2 * len(term.columns))
-    regressor = term.regressor(motion)
+    moves = np.array(moving)[:, None]
+    motion = replace(motion, q=np.where(moves, motion.q, motion.q[:, :1]), v=moves * motion.v, a=moves * motion.a)
+    regressor = np.where(moves[:, None], term.regressor(motion), 0.0)
     size = np.sqrt(np.sum(regressor**2, axis=(0, 2)))
     regressor = regressor / np.where(size > 0.0, size, 1.0)[:, None]
     value = np.random.default_rng(1).uniform(0.5, 1.5, len(size))

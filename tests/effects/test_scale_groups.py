@@ -38,11 +38,14 @@ def per_joint(robot: Robot, unit: float) -> np.ndarray:
     ],
 )
 def test_joints_that_share_parameters_are_compared(links, groups, unit: float, tmp_path: Path):
-    assert scale_groups(build_model(in_unit(links, unit, tmp_path)).rigid_body) == groups
+    assert scale_groups(build_model(in_unit(links, unit, tmp_path)).rigid_body, (True,) * len(links)) == groups
 
 
 def test_all_joints_of_an_arm_in_space_are_compared():
-    assert scale_groups(build_model(load_robot("ur5")).rigid_body) == ((0, 1, 2, 3, 4, 5),)
+    term = build_model(load_robot("ur5")).rigid_body
+    assert scale_groups(term, (True,) * 6) == ((0, 1, 2, 3, 4, 5),)
+    # One that rests says nothing of the others'.
+    assert scale_groups(term, (False, True, True, False, False, False)) == ((0,), (1, 2), (3,), (4,), (5,))
 
 
 def test_of_two_joints_that_share_parameters_the_second_is_tried(tmp_path: Path):
