@@ -48,7 +48,11 @@ def standstill(stretch: Stretch, motion: Motion, bands: Bands) -> NDArray[np.boo
     So is where it turns sharply, however fast: friction jumps there and the acceleration with it, and the filter, which
     rounds that off, moves the time of the turn. Where samples are few, so is every turn.
     """
-    found = slower(motion.v, rest_speeds(stretch, motion, bands), stretch.rate, bands)
+    speeds, stepping = rest_speeds(stretch, motion, bands), stepping_speeds(stretch, bands)
+    found = slower(motion.v, speeds, stretch.rate, bands)
+    if np.any(stepping >= speeds):
+        # Where steps decide a joint goes to and fro, for half a period of the filter each way, however long that is.
+        found |= slower(motion.v, np.where(stepping >= speeds, stepping, -1.0), stretch.rate, bands, longest=np.inf)
     for own, v, a, cut, band in zip(found, motion.v, motion.a, position_cuts(stretch.rate, bands), bands, strict=True):
         turns = np.flatnonzero(np.diff(np.signbit(v)) & ~own[:-1]) + 1
         few = band is not None and stretch.rate < FEW_SAMPLES * band
@@ -87,11 +91,13 @@ def stepping_speeds(stretch: Stretch, bands: Bands) -> Array:
     return np.array([(step or 0.0) * (cut or 0.5 * stretch.rate) for step, cut in zip(steps, cuts, strict=True)])
 
 
-def slower(v: Array, speeds: Array, rate: float, bands: Bands) -> NDArray[np.bool_]:
-    """Return where each joint is slower than a speed for some samples, shape (n, N), widened as `standstill`."""
+def slower(
+    v: Array, speeds: Array, rate: float, bands: Bands, *, longest: float = LONGEST_WIDENING
+) -> NDArray[np.bool_]:
+    """Return where each joint is slower than a speed for some samples, shape (n, N), widened as `standstill`, by so many s at most."""
     found = np.zeros(v.shape, dtype=bool)
     for own, slow, band in zip(found, np.abs(v) <= speeds[:, None], bands, strict=True):
-        widen = _widening(REST_WIDEN, rate, band)
+        widen = _widening(REST_WIDEN, rate, band, longest)
         for start, stop in runs_of(slow):
             if stop - start > 1:
                 own[max(0, start - widen) : stop + widen] = True
@@ -122,8 +128,8 @@ def fading(rest: NDArray[np.bool_], rate: float, bands: Bands) -> Array:
     return result
 
 
-def _widening(periods: float, rate: float, band: float | None) -> int:
-    return 1 if band is None else max(1, int(rate * min(periods / (POSITION_BAND * band), LONGEST_WIDENING)))
+def _widening(periods: float, rate: float, band: float | None, longest: float = LONGEST_WIDENING) -> int:
+    return 1 if band is None else max(1, int(rate * min(periods / (POSITION_BAND * band), longest)))
 
 
 def velocity_noise(stretch: Stretch, motion: Motion, joint: int, band: float | None, least: float) -> float:

@@ -52,15 +52,16 @@ def stepping(run: Recording, step: float, band: float) -> tuple[PreparedStretch,
     return only(made, (band, band)), np.flatnonzero(v == slow)[200:-200]
 
 
-def test_where_an_encoder_makes_less_than_a_step_in_a_period_of_the_filter_it_is_at_rest(run: Recording):
+@pytest.mark.parametrize("band", [1.0, 2.0, 5.0])
+def test_where_an_encoder_makes_less_than_a_step_in_a_period_of_the_filter_it_is_at_rest(run: Recording, band: float):
     """A slide that rested half of the time moved at less than that beside it: its speed went to and fro, and had a Stribeck friction."""
-    part, slow = stepping(run, 2e-3, 2.0)
+    part, slow = stepping(run, 2e-3, band)
     assert part.stretch.steps == pytest.approx((2e-3, 2e-3))
     # As the filtered positions have it, it goes to and fro.
     assert np.min(part.motion.v[0, slow]) < 0.0 < np.mean(part.motion.v[0, slow])
     assert part.rest[:, slow].all()
     assert not part.rest[:, 5200:5400].any()
-    fine, slow = stepping(run, 2e-5, 2.0)
+    fine, slow = stepping(run, 2e-5, band)
     assert not fine.rest[:, slow].any()
 
 
