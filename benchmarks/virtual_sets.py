@@ -388,14 +388,12 @@ def main() -> None:
     options = parser.parse_args()
     given = [parse_effect(text) for text in options.effect]
     for k, (kind, seed) in enumerate(tasks(options.count, options.seed, options.only or KINDS)):
-        label = "_".join(effect.name for effect in given) or kind
-        folder = options.output / f"{k:03d}_{label}"
+        folder = options.output / f"{k:03d}_{'_'.join(effect.name for effect in given) or kind}"
         try:
             write_set(simulate_set(kind, seed, options.robot, folder, asked_for(options), given), folder)
+            print(folder, flush=True)
         except UsageError as error:
             print(f"{folder} was not simulated: {error}", file=sys.stderr, flush=True)
-        else:
-            print(folder, flush=True)
 
 
 if __name__ == "__main__":
