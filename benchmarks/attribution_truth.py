@@ -26,7 +26,7 @@ from scara_ident.diagnosis.correction import taken_out
 from scara_ident.diagnosis.nonlinear_fit import tune
 from scara_ident.diagnosis.search import scene_of
 from scara_ident.diagnosis.selection_step import SelectionStep, model_with, observed_at_every_sample
-from scara_ident.effects import CATALOGUE, Member
+from scara_ident.effects import CATALOGUE, Member, Scene
 from scara_ident.effects.measurement import TimeDelay, shifted
 from scara_ident.errors import ScaraIdentError
 from scara_ident.estimation.estimate import joint_errors
@@ -194,12 +194,12 @@ def true_model_error(result: Diagnosis, made: VirtualSet) -> dict[str, Any] | No
     -------
     dict or None
         Rms of each joint in training and validation, in validation with all fitted, and in training without each of the
-        effects in turn; None where the catalogue has no family for an effect.
+        effects in turn; None where the catalogue has no family for an effect, or the arm's torque nothing of it.
     """
     scene, bands = result.search.scene, result.search.bands
     joints = made.robot.joints
     late = _late(made)
-    others = [_candidates(effect, made) for effect in made.effects if effect.name != "time_delay"]
+    others = [_candidates(effect, made, scene) for effect in made.effects if effect.name != "time_delay"]
     training, held_out = (
         prepare([shifted(item, late) for item in items], bands) for items in (made.training, made.held_out)
     )
@@ -263,8 +263,11 @@ def _errors(joints: Sequence[str], errors: Sequence[Any]) -> dict[str, float]:
     return {joint: error.rms for joint, error in zip(joints, errors, strict=True) if error}
 
 
-def _candidates(effect: Effect, made: VirtualSet) -> list[Candidate]:
-    """Return the member of the effect's family that has its nonlinear parameters, or several of which one is closest."""
+def _candidates(effect: Effect, made: VirtualSet, scene: Scene) -> list[Candidate]:
+    """Return the member of the effect's family that has its nonlinear parameters, or several of which one is closest.
+
+    None of an effect that does nothing to this arm's torque, as a tilt to first order to that of a slide that stands.
+    """
     values = effect.as_dict()["parameters"]
     joints = made.robot.joints
     place = None if effect.joint is None else joints.index(effect.joint)
@@ -279,7 +282,8 @@ def _candidates(effect: Effect, made: VirtualSet) -> list[Candidate]:
             points = [tuple(float(values[name]) for name in names)]
         else:
             continue
-        return [Candidate(family, Member(place, point, partner)) for point in points]
+        members = [Member(place, point, partner) for point in points]
+        return [Candidate(family, member) for member in members if family.columns(scene, member)]
     return []
 
 

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -26,7 +27,7 @@ from virtual_conditions import Asked, Conditions, Noise, Start, draw_conditions,
 from virtual_events import draw_events, event_truth
 from virtual_motions import after_rest, random_motion, refuse_shaking
 
-from scara_ident.errors import ScaraIdentError
+from scara_ident.errors import ScaraIdentError, UsageError
 from scara_ident.recording.recording import Recording, split_name, write_recording
 from scara_ident.robot.examples import example_urdf
 from scara_ident.robot.robot import Robot, load_robot
@@ -70,6 +71,8 @@ SIZE = {
 # Elasticity is the larger the smaller its parameter.
 INVERSE = ("joint_elasticity",)
 WHOLE_ARM = ("base_tilt", "payload_change", "time_delay")
+# Effects between joints: an arm of one joint has none.
+OF_TWO_JOINTS = ("torque_gain_mismatch", "friction_coupling")
 UNLISTED = ("unlisted_1", "unlisted_2")
 SEVERAL = {"pair": 2, "triple": 3}
 KINDS = (*SIZE, "none", "none", "none", "unlisted", "unlisted", "pair", "pair", "triple")
@@ -190,7 +193,8 @@ def pick_effects(kind: str, arm: VirtualArm, rng: np.random.Generator) -> tuple[
     elif kind == "unlisted":
         names = [str(rng.choice(UNLISTED))]
     elif kind in SEVERAL:
-        names = [str(name) for name in rng.choice(list(SIZE), SEVERAL[kind], replace=False)]
+        possible = [name for name in SIZE if arm.robot.n > 1 or name not in OF_TWO_JOINTS]
+        names = [str(name) for name in rng.choice(possible, SEVERAL[kind], replace=False)]
     else:
         names = [kind]
     effects, factors = [], []
@@ -203,6 +207,8 @@ def pick_effects(kind: str, arm: VirtualArm, rng: np.random.Generator) -> tuple[
 
 def _random_effect(name: str, factor: float, arm: VirtualArm, rng: np.random.Generator) -> Effect:
     joint = None if name in WHOLE_ARM else str(rng.choice(arm.robot.joints))
+    if arm.robot.n < 2 and name in OF_TWO_JOINTS:
+        raise UsageError(f"{name}: {arm.robot.name} has one joint; it needs two")
     if name == "torque_gain_mismatch":
         joint = str(rng.choice(arm.robot.joints[1:]))
     effect: Any = EFFECTS[name](joint=joint).resolve(arm)
@@ -382,10 +388,12 @@ def main() -> None:
     options = parser.parse_args()
     given = [parse_effect(text) for text in options.effect]
     for k, (kind, seed) in enumerate(tasks(options.count, options.seed, options.only or KINDS)):
-        label = "_".join(effect.name for effect in given) or kind
-        folder = options.output / f"{k:03d}_{label}"
-        write_set(simulate_set(kind, seed, options.robot, folder, asked_for(options), given), folder)
-        print(folder, flush=True)
+        folder = options.output / f"{k:03d}_{'_'.join(effect.name for effect in given) or kind}"
+        try:
+            write_set(simulate_set(kind, seed, options.robot, folder, asked_for(options), given), folder)
+            print(folder, flush=True)
+        except UsageError as error:
+            print(f"{folder} was not simulated: {error}", file=sys.stderr, flush=True)
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from scara_ident.motion.motion import Motion
 from scara_ident.recording.recording import Recording, split_name
-from scara_ident.robot.robot import Robot
+from scara_ident.robot.robot import Robot, load_robot
 
 Array = NDArray[np.float64]
 
@@ -68,6 +68,31 @@ PLANAR_2R = (
     Link(axis=(0.0, 1.0, 0.0), xyz=(0.4, 0.0, 0.0), mass=1.5, com=(0.12, 0.0, 0.02), inertia=(0.005, 0.03, 0.03)),
 )
 """Two links in a vertical plane."""
+
+UP, ALONG = (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)
+CYLINDRICAL = (
+    Link(axis=UP, mass=40.0, com=(0.05, 0.0, 0.3), inertia=(4.0, 4.0, 0.6)),
+    Link("prismatic", axis=UP, mass=22.0, com=(0.1, 0.02, 0.0), inertia=(0.3, 0.4, 0.5)),
+    Link("prismatic", axis=ALONG, xyz=(0.2, 0.0, 0.0), mass=12.0, com=(-0.2, 0.0, 0.0), inertia=(0.02, 1.4, 1.4)),
+)
+"""A column that turns, a carriage that it lifts, and a ram that reaches out."""
+
+
+def in_unit(links: tuple[Link, ...], unit: float, folder: Path) -> Robot:
+    """Return an arm whose lengths are told in another unit, so many to the metre."""
+    scaled = [
+        replace(
+            link, xyz=tuple(unit * x for x in link.xyz), com=tuple(unit * x for x in link.com),
+            inertia=tuple(unit**2 * x for x in link.inertia),
+        )
+        for link in links
+    ]  # fmt: skip
+    path = write_urdf(folder / "arm.urdf", scaled)
+    lines = path.read_text(encoding="utf-8").replace('lower="-3" upper="3"', 'lower="{0}" upper="{1}"').split("\n")
+    ends = [3.0 * unit if 'type="prismatic"' in line else 3.0 for line in lines]
+    path.write_text("\n".join(line.format(-end, end) for line, end in zip(lines, ends, strict=True)), encoding="utf-8")
+    (folder / "robot.yaml").write_text(f"urdf: arm.urdf\ngravity: [0, 0, {-9.81 * unit}]\n", encoding="utf-8")
+    return load_robot(folder / "robot.yaml")
 
 
 def example_urdf(name: str) -> Path:

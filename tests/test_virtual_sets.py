@@ -10,9 +10,12 @@ from types import ModuleType
 import numpy as np
 import pytest
 
+from scara_ident.diagnosis.diagnose import diagnose
+from scara_ident.errors import UsageError
 from scara_ident.recording.recording import read_recordings
 from scara_ident.robot.robot import load_robot
 from scara_ident.simulation import virtual_arm
+from tests.arms import Link, write_urdf
 
 pytestmark = pytest.mark.slow
 
@@ -47,6 +50,28 @@ def test_motions_keep_all_limits_and_are_their_own_derivatives(sets: ModuleType,
     for value, slope in ((motion.position, motion.velocity), (motion.velocity, motion.acceleration)):
         step = np.diff(motion.time) * 0.5 * (slope[:, 1:] + slope[:, :-1])
         np.testing.assert_allclose(value[:, 1:] - value[:, :1], np.cumsum(step, axis=1), atol=2e-4)
+
+
+def test_an_arm_of_one_joint_has_every_effect_that_needs_no_other(sets: ModuleType, tmp_path: Path) -> None:
+    """A pair with a torque scale, and one alone, ended the run, as a tilt of a lift did, whose torque has nothing of it."""
+    lift = Link("prismatic", axis=(0.0, 0.0, 1.0), mass=2.0)
+    path = str(write_urdf(tmp_path / "lift.urdf", [lift]))
+    arm = virtual_arm(load_robot(path))
+    for kind in sorted(set(sets.KINDS)):
+        for seed in range(8 if kind in sets.SEVERAL else 1):
+            draw = np.random.default_rng(seed)
+            if kind in sets.OF_TWO_JOINTS:
+                with pytest.raises(UsageError, match="has one joint; it needs two"):
+                    sets.pick_effects(kind, arm, draw)
+            else:
+                effects, _ = sets.pick_effects(kind, arm, draw)
+                assert not {effect.name for effect in effects} & {*sets.OF_TWO_JOINTS}
+    import attribution_truth
+
+    tilted = sets.simulate_set("base_tilt", 3, path, tmp_path / "set", small(sets))
+    result = diagnose(tilted.robot, tilted.training, validation=tilted.held_out, catalogue=())
+    assert attribution_truth.true_model_error(result, tilted) is None
+    assert attribution_truth.one_set("torque_gain_mismatch", 3, path, small(sets), 60).endswith("it needs two")
 
 
 def test_a_set_is_the_same_for_the_same_seed_and_is_read_as_it_was_made(sets: ModuleType, tmp_path: Path) -> None:

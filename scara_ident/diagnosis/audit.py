@@ -14,12 +14,13 @@ from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.cluster_test import significance
 from scara_ident.diagnosis.effect_parameters import Coefficients, physical_parameters, told_size
 from scara_ident.diagnosis.moments import examine_moments
-from scara_ident.diagnosis.noise_check import made_by_noise, noise_objection, within_a_step
+from scara_ident.diagnosis.noise_check import BY_NOISE, made_by_noise, noise_objection, within_a_step
 from scara_ident.diagnosis.remainder_check import remainder_objection
 from scara_ident.diagnosis.search import Search
 from scara_ident.diagnosis.selection_step import SelectionStep, best_of_each
 from scara_ident.diagnosis.variation_check import variation_objection
 from scara_ident.effects import Parameter
+from scara_ident.estimation.noise_bias import NEGLIGIBLE, noise_shares
 from scara_ident.estimation.run_variation import LEAST_RUNS
 
 
@@ -37,7 +38,10 @@ def unsettled(found: Search, weights: Array) -> list[Decision]:
     if not step.chosen:
         return []
     # Whether runs that differ make it is asked of it alone, on rows that weigh them as noise.
-    coefficients = physical_parameters(step, scatter_alone=True).coefficients
+    coefficients = physical_parameters(step, of_runs=False, of_noise=False).coefficients
+    noisy = max(noise_shares(step.observations.data), default=0.0) >= NEGLIGIBLE
+    free = [noisy and bool(item.effect.nonlinear) and not item.effect.together for item in step.chosen]
+    moved = physical_parameters(step, of_runs=False).coefficients if any(free) else coefficients
     # One of several that act together may mend what another lacks: then scatter alone does not say how unsure it is.
     sizes = physical_parameters(step).effects if len(step.scene.together) > 1 else ()
     result = []
@@ -47,6 +51,8 @@ def unsettled(found: Search, weights: Array) -> list[Decision]:
         why = None if decision.accepted else decision.why
         least, essential = step.criteria.least_final_size, candidate.effect.essential(step.scene, candidate.member)
         why = why or uncertain(own, decision.examination, essential, least)
+        if why is None and free[place]:
+            why = _moved_by_noise(moved[place], decision.examination, essential, least)
         if why is None and sizes and candidate.effect.together:
             why = _unsized(step, candidate, sizes[place])
         small = candidate.effect.negligible(step.scene, candidate.member, own.at_least(least))
@@ -58,6 +64,25 @@ def unsettled(found: Search, weights: Array) -> list[Decision]:
         if why is not None:
             result.append(decision.refused(why))
     return result
+
+
+def _moved_by_noise(own: Coefficients, examination: Examination, essential: slice, least: float) -> str | None:
+    """Say so where the noise of the positions moves an effect by as much as it is, with all its parameters free.
+
+    With these held, `noise_objection` sees less: what of a size lies where no row is, such as that of friction near rest behind a coarse
+    encoder, goes to any value with them.
+
+    Parameters
+    ----------
+    own : Coefficients
+        With what the noise does in their covariance.
+    examination, essential, least
+        See `uncertain`.
+    """
+    p_value = _chance(own, examination, essential)
+    if p_value <= _of_normal(least):
+        return None
+    return f"{BY_NOISE} moves its size by as much once its other parameters are free: p = {p_value:.1e}"
 
 
 def _unsized(step: SelectionStep, candidate: Candidate, sizes: Mapping[str, Parameter]) -> str | None:
@@ -233,13 +258,23 @@ def uncertain(own: Coefficients, examination: Examination, essential: slice, lea
     least : float
         Standard deviations that one coefficient would have to lie from zero, beyond which many blocks let so few by.
     """
-    from scipy.special import erfc
+    p_value = _chance(own, examination, essential)
+    if p_value <= _of_normal(least):
+        return None
+    return f"beside all that was found its size is within its uncertainty: p = {p_value:.1e}"
 
+
+def _chance(own: Coefficients, examination: Examination, essential: slice) -> float:
+    """Return the probability that coefficients which are none would be as large, see `uncertain`."""
     value, covariance = own.value[essential], own.covariance[essential, essential]
     if not np.array_equal(examination.tested, examination.value):
         # The freedom is that of weighted blocks, which are less sure.
         covariance = covariance + examination.covariance[essential, essential]
-    p_value = significance(value, covariance, examination.freedom, examination.products[essential, essential])
-    if p_value <= float(erfc(least / 2.0**0.5)):
-        return None
-    return f"beside all that was found its size is within its uncertainty: p = {p_value:.1e}"
+    return significance(value, covariance, examination.freedom, examination.products[essential, essential])
+
+
+def _of_normal(stds: float) -> float:
+    """Return the probability that a normal variable lies so many standard deviations off, either way."""
+    from scipy.special import erfc
+
+    return float(erfc(stds / 2.0**0.5))

@@ -84,13 +84,13 @@ def told_size(effect: Effect, parameters: Mapping[str, Parameter], stds: float) 
     return any(abs(size.value) > stds * size.std for size in sizes)
 
 
-def physical_parameters(step: SelectionStep, *, scatter_alone: bool = False) -> PhysicalParameters:
+def physical_parameters(step: SelectionStep, *, of_runs: bool = True, of_noise: bool = True) -> PhysicalParameters:
     """Return the physical parameters of each chosen effect, and the rotor inertias that they depend on.
 
     Parameters
     ----------
-    scatter_alone : bool, optional
-        Whether standard deviations leave out what runs differ by and what the noise of the positions does.
+    of_runs, of_noise : bool, optional
+        Whether standard deviations hold what runs differ by, and what the noise of the positions moves parameters by.
 
     Notes
     -----
@@ -98,7 +98,7 @@ def physical_parameters(step: SelectionStep, *, scatter_alone: bool = False) -> 
     covariance is that of all parameters together.
     """
     state = linearise(step)
-    covariance = _covariance(step, state, scatter_alone=scatter_alone)
+    covariance = _covariance(step, state, of_runs=of_runs, of_noise=of_noise)
     undetermined = merge([state.information, state.prior]).solve().undetermined
     found: list[dict[str, Parameter]] = []
     coefficients = []
@@ -189,7 +189,7 @@ def parameters_beside(step: SelectionStep, candidate: Candidate) -> dict[str, Pa
     return dict(candidate.effect.parameters(step.scene, candidate.member, alone.value, covariance))
 
 
-def _covariance(step: SelectionStep, state: Linearised, *, scatter_alone: bool) -> Array:
+def _covariance(step: SelectionStep, state: Linearised, *, of_runs: bool, of_noise: bool) -> Array:
     """Block covariance of all parameters, with what the priors leave open, which no residual shows."""
     inverse = merge([state.information, state.prior]).inverse()
     value = np.concatenate([state.value, np.zeros(len(state.unknowns))])
@@ -197,12 +197,14 @@ def _covariance(step: SelectionStep, state: Linearised, *, scatter_alone: bool) 
     rows = beside_offsets(replace(step.observations, joints=tuple(state.joints)), step.offsets)
     influence = rows.influence.joints
     spread = block_covariance(inverse, value, influence, step.observations.owner, step.weights).matrix
-    if not scatter_alone:
+    if of_runs:
         variation = run_variation(step.observations, state.joints, value, taken=rows.taken(inverse, step.weights))
         if step.offsets is not None and len(step.observations.data.recordings) < LEAST_RUNS:
             variation = step.offsets
+        spread = spread + variation.covariance(inverse, influence, step.weights)
+    if of_noise:
         bias = _noise_bias(step, state)
-        spread = spread + variation.covariance(inverse, influence, step.weights) + np.outer(bias, bias)
+        spread = spread + np.outer(bias, bias)
     known = state.prior.factor[:, :-1]
     return np.asarray(spread + state.variance * inverse @ (known.T @ known) @ inverse)
 

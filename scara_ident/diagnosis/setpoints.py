@@ -9,7 +9,7 @@ from __future__ import annotations
 from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.selection_step import SelectionStep
 from scara_ident.effects import Effect, Member
-from scara_ident.motion.position_noise import encoder_step
+from scara_ident.motion.encoder_steps import encoder_step
 from scara_ident.motion.prepared import PreparedData
 from scara_ident.recording.audit.position import is_computed
 

@@ -12,6 +12,7 @@ import numpy as np
 from scara_ident.arrays import Array
 from scara_ident.effects.effect import DOUBT_STDS, Effect
 from scara_ident.effects.parameters import Coefficient, Member, Parameter, View, deviation
+from scara_ident.effects.scale_groups import scale_groups
 from scara_ident.effects.signals import Scene, Signals
 from scara_ident.motion.low_pass import HIGHEST_CUT, differentiate
 from scara_ident.motion.motion import UNIFORM_TOLERANCE
@@ -27,7 +28,7 @@ LONGEST_DELAY = 0.05
 LONGEST_DELAY_SAMPLES = 5.0
 # Torque scales of one arm that differ by more than this factor, either way, are a wrong unit, not a mismatch.
 LARGEST_MISMATCH = 2.0
-# Of so few joints that differ in their scales either may be the one that is wrong; of more, most agree.
+# Of so few joints that share parameters either may be the one whose scale is wrong; of more, most agree.
 MOST_TO_DOUBT = 2
 # Torque that is held from one sample to the next, or averaged over one, is up to this many samples off its time stamp.
 SAMPLING = 1.0
@@ -77,10 +78,10 @@ class TorqueGainMismatch(Effect):
     """A torque scale that differs from that of the other joints: ``recorded = scale u``.
 
     A scale that is wrong for all joints alike goes into all parameters; what two joints' torques say of the parameters
-    that they share tells the ratio of their scales, weakly. The joints of which none is named agree with one another.
-    ``ratio`` is the joint's scale over the first joint's, whether or not the first joint is found to differ too. Where it
-    is, it is named itself, with the ratio of its scale to that of the joints that are not named. Of an arm of two
-    joints nothing tells which is wrong: the second is named.
+    that they share tells the ratio of their scales, weakly, and of joints that share none, or rest, nothing does (`scale_groups`). The joints of
+    which none is named agree with one another. ``ratio`` is the joint's scale over that of the first joint that it shares parameters
+    with, whether or not that is found to differ too. Where it is, it is named itself, with the ratio of its scale to
+    that of the joints that are not named. Where two joints share parameters nothing tells which is wrong: the second is named.
     """
 
     name = "torque_gain_mismatch"
@@ -95,19 +96,23 @@ class TorqueGainMismatch(Effect):
 
     def description(self, scene: Scene, member: Member) -> str:
         """Say whose scale that of the first joint differs from."""
-        return (
-            super().description(scene, member)
-            if member.joint
-            else "a torque scale that differs from that of the joints not named"
-        )
+        first = _compared(scene, member)[0]
+        if member.joint == first:
+            return "a torque scale that differs from that of the joints not named"
+        return f"a torque scale that differs from that of {scene.robot.joints[first]}" if first else self.summary
 
     def joints(self, scene: Scene) -> list[int]:
-        """Return all joints; of two the second, as either explains what the other does."""
-        return list(range(0 if scene.robot.n > MOST_TO_DOUBT else 1, scene.robot.n))
+        """Return all joints whose scale another's tells; of two the second, as either explains what the other does."""
+        groups = [group for group in _groups(scene) if len(group) > 1]
+        return sorted(j for group in groups for j in (group if len(group) > MOST_TO_DOUBT else group[1:]))
 
     def or_else(self, scene: Scene, member: Member, value: Array) -> str:
         """Say of two joints that it may be the other one."""
-        return "" if scene.robot.n > MOST_TO_DOUBT else "; of two joints nothing tells which one's is wrong"
+        return (
+            ""
+            if len(_compared(scene, member)) > MOST_TO_DOUBT
+            else "; of two joints nothing tells which one's is wrong"
+        )
 
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
         """Return the predicted torque."""
@@ -115,7 +120,8 @@ class TorqueGainMismatch(Effect):
 
     def told_beside(self, scene: Scene, member: Member) -> Member | None:
         """Return that of the first joint, to whose scale the ratio is."""
-        return Member(0) if member.joint else None
+        first = _compared(scene, member)[0]
+        return None if member.joint == first else Member(first)
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """Say so of a scale that no two torque constants of an arm differ by."""
@@ -132,6 +138,15 @@ class TorqueGainMismatch(Effect):
         ratio = float(scale[0] / scale[1])
         slope = np.array([1.0, -ratio]) / scale[1]
         return {"ratio": Parameter(ratio, float(np.sqrt(max(slope @ covariance @ slope, 0.0))), "1")}
+
+
+def _compared(scene: Scene, member: Member) -> tuple[int, ...]:
+    """Return the joints whose scales are compared, that of a member among them."""
+    return next(group for group in _groups(scene) if member.place in group)
+
+
+def _groups(scene: Scene) -> tuple[tuple[int, ...], ...]:
+    return scale_groups(scene.model.rigid_body, tuple(scene.moving.tolist()))
 
 
 class TimeDelay(Effect):

@@ -92,10 +92,18 @@ class Scene:
         millimetres has as many of them as a gantry of some metres. A joint that stands still has the range that its limits
         leave.
         """
-        robot, length = self.robot, self.travel
-        stroke = np.where(np.isfinite(robot.upper - robot.lower), robot.upper - robot.lower, 1.0)
-        length = np.where(length > SMALLEST_TRAVEL * stroke, length, stroke)
-        return np.where(robot.prismatic, length / np.pi, 1.0)
+        length = np.where(self.moving, self.travel, self._stroke)
+        return np.where(self.robot.prismatic, length / np.pi, 1.0)
+
+    @cached_property
+    def moving(self) -> NDArray[np.bool_]:
+        """Which joints travel, by more than what an encoder may waver by, shape (n,)."""
+        return np.asarray(self.travel > SMALLEST_TRAVEL * self._stroke)
+
+    @property
+    def _stroke(self) -> Array:
+        stroke = self.robot.upper - self.robot.lower
+        return np.where(np.isfinite(stroke), stroke, 1.0)
 
     def armature(self, joint: int) -> float:
         """Armature N^2 Jm of a joint: what the data tell of it, else its nominal value."""

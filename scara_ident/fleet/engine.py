@@ -26,6 +26,8 @@ LOOK_SECONDS = 2.0
 # A piece of work that so many workers died on is given up.
 MOST_DEATHS = 3
 CONNECT_SECONDS = "10s"
+# Variables that Dask gives processes beside those of its configuration.
+BESIDE = ("PYTHONHASHSEED", "__DASK_PARENT_PID")
 # Bytes up to which a worker of this machine holds the memory of an array for the next one, and of all of them together.
 KEPT_ARRAY, KEPT_MEMORY = 32 << 20, 128 << 20
 
@@ -155,6 +157,8 @@ def started(scheduler: str | None = None, workers: int | None = None) -> Iterato
                 return
             count = workers or len(os.sched_getaffinity(0))
             with ExitStack() as stack:
+                spawned = dask.config.get("distributed.nanny.pre-spawn-environ")
+                stack.enter_context(_environment_kept((*spawned, *BESIDE)))
                 # Its processes, and those that stand in for them later, hear of no Ctrl-C: they are ended from here. Python's
                 # own process beside them is there before, as what starts it lets Ctrl-C through again.
                 resource_tracker.ensure_running()
@@ -173,6 +177,20 @@ def started(scheduler: str | None = None, workers: int | None = None) -> Iterato
                 yield Engine(client)
         finally:
             log.setLevel(level)
+
+
+@contextmanager
+def _environment_kept(names: Iterable[str]) -> Iterator[None]:
+    """Put back variables of the environment, into which Dask writes what the processes that it starts are to have."""
+    before = {name: os.environ.get(name) for name in names}
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
 
 
 def run_all(

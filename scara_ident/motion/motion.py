@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scara_ident.arrays import Array, median
 from scara_ident.errors import RecordingError
 from scara_ident.manners import Frozen
+from scara_ident.motion.encoder_steps import encoder_step
 from scara_ident.motion.low_pass import differentiate
 from scara_ident.motion.spline import cubic_spline
 from scara_ident.recording.audit.samples import GAP_STEPS
@@ -106,6 +107,8 @@ class Stretch:
         Samples of the recording that it was made of.
     clipped : ndarray of bool, shape (n, N), or False
         Where a torque is at the value at which the recording is clipped, or stuck most of the time.
+    steps : tuple of float or None, one per joint
+        In which its encoder has the recorded positions, see `encoder_step`; empty where nobody looked.
     """
 
     name: str
@@ -116,6 +119,7 @@ class Stretch:
     rate: float
     source: slice
     clipped: NDArray[np.bool_] | bool = False
+    steps: tuple[float | None, ...] = ()
     _filtered: dict[tuple[int, float | None], tuple[Array, Array, Array]] = field(default_factory=dict, repr=False)
     _thinned: dict[int, Stretch] = field(default_factory=dict, repr=False)
 
@@ -173,11 +177,13 @@ def stretches(recording: Recording) -> tuple[Stretch, ...]:
     # Nothing is interpolated across a gap.
     cuts = np.flatnonzero(step > GAP_STEPS * middle) + 1
     bounds = cut_long(sorted({0, *cuts.tolist(), *recording.cuts, len(recording.time)}))
+    # On another time grid positions are between the steps.
+    steps = tuple(encoder_step(row) for row in recording.position)
     found = []
     for start, stop in pairwise(bounds):
         if stop - start < 4:
             continue
-        found.append(_uniform(recording, start, stop, middle))
+        found.append(replace(_uniform(recording, start, stop, middle), steps=steps))
     if not found:
         raise RecordingError(f"{recording.path or recording.name}: no four samples in a row without a gap in time")
     return tuple(found)
@@ -281,6 +287,7 @@ def thinned(stretch: Stretch, step: int) -> Stretch:
             stretch.rate / step,
             stretch.source,
             stretch.clipped if isinstance(stretch.clipped, bool) else _means(stretch.clipped.astype(float), step) > 0.0,
+            stretch.steps,
         )
     torque = None if stretch.torque is None else _means(stretch.torque, step)
     return replace(stretch._thinned[step], torque=torque)

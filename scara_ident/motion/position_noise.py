@@ -16,12 +16,9 @@ from scara_ident.arrays import NORMAL_MEDIAN, Array, median
 from scara_ident.motion.low_pass import low_pass, removed_share
 from scara_ident.motion.motion import Stretch
 from scara_ident.motion.prepared import PreparedData, PreparedRecording, PreparedStretch
-from scara_ident.motion.rest import REST_NOISE, WIDE, position_cuts, velocity_noise
+from scara_ident.motion.rest import REST_NOISE, WIDE, position_cuts, stepping_speeds, velocity_noise
 from scara_ident.threads import side_by_side
 
-# Positions have steps where their changes are whole multiples of the least one, but for this much of it in the mean:
-# numbers of random size leave a quarter.
-WHOLE = 0.1
 # An interval longer than so many usual ones has lost samples; a clock is uneven, and its stamps rounded, from these shares of the
 # interval on, as `scara_ident.recording.audit` says so. Finer than this, s, stamps that count from 1970 hold rounding alone.
 LOST, JITTER, COARSE, FINEST = 1.5, 0.03, 0.02, 1e-6
@@ -57,32 +54,6 @@ LEVER = 10.0
 SPEED_OVER = 0.1
 
 
-def encoder_step(position: Array) -> float | None:
-    """Return the step of an encoder; None where positions do not go in steps.
-
-    Parameters
-    ----------
-    position : ndarray, shape (N,)
-        rad or m.
-    """
-    change = np.abs(np.diff(position))
-    largest = max(np.max(position, initial=0.0), -np.min(position, initial=0.0))
-    # What rounding of a number in single precision leaves is no change.
-    changed = change > 4.0 * np.finfo(np.float32).eps * largest
-    # A joint that is never at rest is not copied.
-    change = change if np.all(changed) else change[changed]
-    if len(change) < 4:
-        return None
-    least = float(np.min(change))
-    step = median(change[change < 1.5 * least])
-    multiple = change / step
-    # Beyond so many steps at once the error of the step itself adds up.
-    near = multiple[multiple < 1.0 / WHOLE]
-    if len(near) < 4 or float(np.mean(np.abs(near - np.round(near)))) > WHOLE:
-        return None
-    return step
-
-
 def coarse_positions(item: PreparedRecording) -> str | None:
     """Name the joints whose encoders are too coarse for their bands: what counts as at rest is as fast as they move.
 
@@ -95,15 +66,15 @@ def coarse_positions(item: PreparedRecording) -> str | None:
     nyquist = 0.5 * part.rate
     apart = min(part.samples - 1, max(1, round(SPEED_OVER * part.rate)))
     found = []
-    for joint, position in enumerate(part.stretch.position):
-        step = encoder_step(item.recording.position[joint])
+    slow = stepping_speeds(part.stretch, part.bands)
+    for joint, (position, step) in enumerate(zip(part.stretch.position, part.stretch.steps, strict=True)):
         if step is None:
             continue
         cut = position_cuts(part.rate, part.bands)[joint] or nyquist
         # White noise of a step's rounding, differentiated, up to the filter's frequency.
         noise = step / np.sqrt(12.0) * 2.0 * np.pi * np.sqrt(cut**3 / (3.0 * nyquist))
         speed = np.sqrt(np.mean((position[apart:] - position[:-apart]) ** 2)) * part.rate / apart
-        if REST_NOISE * noise > speed > 0.0:
+        if max(REST_NOISE * noise, slow[joint]) > speed > 0.0:
             found.append((item.recording.joints[joint], step, part.bands[joint]))
     if not found:
         return None
@@ -199,7 +170,7 @@ def noise_sizes(data: PreparedData) -> tuple[tuple[NoiseSizes, ...], ...]:
     if data not in _SIZES:
 
         def of_recording(item: PreparedRecording) -> tuple[NoiseSizes, ...]:
-            steps = tuple(encoder_step(row) for row in item.recording.position)
+            steps = item.longest.stretch.steps
             late = stamp_rounding(item.recording.time) / np.sqrt(12.0)
             return tuple(
                 tuple(

@@ -16,7 +16,8 @@ Bands = Sequence[float | None]
 # Positions pass a filter three times as wide as the band: inside the band it then changes them by under 2e-4.
 POSITION_BAND = 3.0
 # A joint stands still where its speed stays below this share of its peak, or below this many standard deviations of its
-# velocity's noise: friction is then anything up to Coulomb's. The position's low-pass widens it by this many of its periods.
+# velocity's noise: friction is then anything up to Coulomb's. So it is where its encoder makes less than a step in each period of the
+# position's low-pass, which lets the steps pass. That low-pass widens it by this many of its periods.
 REST_SHARE = 3e-3
 REST_NOISE = 5.0
 REST_WIDEN = 0.5
@@ -47,7 +48,11 @@ def standstill(stretch: Stretch, motion: Motion, bands: Bands) -> NDArray[np.boo
     So is where it turns sharply, however fast: friction jumps there and the acceleration with it, and the filter, which
     rounds that off, moves the time of the turn. Where samples are few, so is every turn.
     """
-    found = slower(motion.v, rest_speeds(stretch, motion, bands), stretch.rate, bands)
+    speeds, stepping = rest_speeds(stretch, motion, bands), stepping_speeds(stretch, bands)
+    found = slower(motion.v, speeds, stretch.rate, bands)
+    if np.any(stepping >= speeds):
+        # Where steps decide a joint goes to and fro, for half a period of the filter each way, however long that is.
+        found |= slower(motion.v, np.where(stepping >= speeds, stepping, -1.0), stretch.rate, bands, longest=np.inf)
     for own, v, a, cut, band in zip(found, motion.v, motion.a, position_cuts(stretch.rate, bands), bands, strict=True):
         turns = np.flatnonzero(np.diff(np.signbit(v)) & ~own[:-1]) + 1
         few = band is not None and stretch.rate < FEW_SAMPLES * band
@@ -65,19 +70,34 @@ def standstill(stretch: Stretch, motion: Motion, bands: Bands) -> NDArray[np.boo
 
 
 def rest_speeds(stretch: Stretch, motion: Motion, bands: Bands) -> Array:
-    """Return the speeds below which noise may be what moves each joint, shape (n,)."""
+    """Return the speeds below which noise, or a step of its encoder, may be what moves each joint, shape (n,)."""
     least = REST_SHARE / REST_NOISE * np.max(np.abs(motion.v), axis=1)
     # Those that are not filtered pass a wide filter together.
     unfiltered = [j for j, cut in enumerate(position_cuts(stretch.rate, bands)) if cut is None]
     stretch.filter_all(dict.fromkeys(unfiltered, WIDE * stretch.rate))
-    return REST_NOISE * np.array([velocity_noise(stretch, motion, j, bands[j], least[j]) for j in range(len(bands))])
+    noise = [velocity_noise(stretch, motion, j, bands[j], least[j]) for j in range(len(bands))]
+    # While a joint rests its encoder is silent, and most of a recording may be rest: then that noise is too small.
+    return np.maximum(REST_NOISE * np.array(noise), stepping_speeds(stretch, bands))
 
 
-def slower(v: Array, speeds: Array, rate: float, bands: Bands) -> NDArray[np.bool_]:
-    """Return where each joint is slower than a speed for some samples, shape (n, N), widened as `standstill`."""
+def stepping_speeds(stretch: Stretch, bands: Bands) -> Array:
+    """Return the speed of each joint below which its encoder's steps are slower than what passes the filter, shape (n,).
+
+    Steps of size s at the speed v come v/s times a second. Their fundamental has an amplitude of 2 v in the velocity: where the filter
+    lets it pass, the joint seems to go to and fro. Zero of a joint whose positions do not go in steps.
+    """
+    cuts = position_cuts(stretch.rate, bands)
+    steps = stretch.steps or (None,) * len(cuts)
+    return np.array([(step or 0.0) * (cut or 0.5 * stretch.rate) for step, cut in zip(steps, cuts, strict=True)])
+
+
+def slower(
+    v: Array, speeds: Array, rate: float, bands: Bands, *, longest: float = LONGEST_WIDENING
+) -> NDArray[np.bool_]:
+    """Return where each joint is slower than a speed for some samples, shape (n, N), widened as `standstill`, by so many s at most."""
     found = np.zeros(v.shape, dtype=bool)
     for own, slow, band in zip(found, np.abs(v) <= speeds[:, None], bands, strict=True):
-        widen = _widening(REST_WIDEN, rate, band)
+        widen = _widening(REST_WIDEN, rate, band, longest)
         for start, stop in runs_of(slow):
             if stop - start > 1:
                 own[max(0, start - widen) : stop + widen] = True
@@ -108,8 +128,8 @@ def fading(rest: NDArray[np.bool_], rate: float, bands: Bands) -> Array:
     return result
 
 
-def _widening(periods: float, rate: float, band: float | None) -> int:
-    return 1 if band is None else max(1, int(rate * min(periods / (POSITION_BAND * band), LONGEST_WIDENING)))
+def _widening(periods: float, rate: float, band: float | None, longest: float = LONGEST_WIDENING) -> int:
+    return 1 if band is None else max(1, int(rate * min(periods / (POSITION_BAND * band), longest)))
 
 
 def velocity_noise(stretch: Stretch, motion: Motion, joint: int, band: float | None, least: float) -> float:

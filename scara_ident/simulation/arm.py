@@ -137,6 +137,15 @@ class VirtualArm(Frozen):
         steps = np.where(self.encoder_steps > 0.0, self.encoder_steps, np.inf)
         return np.asarray(2.0 * np.pi / steps / np.abs(self.robot.reduction))
 
+    @property
+    def radian(self) -> Array:
+        """What goes with a radian of a joint that turns, shape (n,): 1, and of one that slides its stroke over pi, m.
+
+        Lengths that effects have by default are multiples of it. A slide without limits has a stroke of a metre.
+        """
+        stroke = self.robot.upper - self.robot.lower
+        return np.where(self.robot.prismatic, np.where(np.isfinite(stroke), stroke, 1.0) / np.pi, 1.0)
+
     def link_inertia(self) -> Array:
         """Return the diagonal of the links' mass matrix at the neutral pose, without rotors, shape (n,)."""
         from scara_ident.simulation.spatial import mass_and_bias

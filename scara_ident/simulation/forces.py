@@ -130,7 +130,7 @@ def _friction(plant: Plant, room: Room, t: float, x: State, start: Array) -> Non
             warm = 1.0 + plant.warm_share[j] * np.exp(-t / plant.warm_time[j])
         dry = f[0] * warm
         if plant.position_share[j] != 0.0:
-            dry *= 1.0 + plant.position_share[j] * np.sin(theta[j] + plant.position_phase[j])
+            dry *= 1.0 + plant.position_share[j] * np.sin(plant.position_order[j] * theta[j] + plant.position_phase[j])
         if plant.stribeck_amplitude[j] != 0.0:
             ratio = w / plant.stribeck_velocity[j]
             dry += plant.stribeck_amplitude[j] * np.exp(-ratio * ratio)

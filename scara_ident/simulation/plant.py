@@ -45,6 +45,7 @@ class Plant(NamedTuple):
     warm_time: Array
     position_share: Array
     position_phase: Array
+    position_order: Array
     spring: Array
     spring_rest: Array
     efficiency: Array
@@ -191,7 +192,7 @@ def empty_draft(n: int, scale: Array, reduction: Array) -> PlantDraft:
         "spring_rest elastic stiffness damping width signed_sine swinging_viscous"
     )
     arrays: dict[str, Array] = {name: zero.copy() for name in per_joint.split()}
-    arrays |= {name: np.ones(n) for name in ("stribeck_velocity", "warm_time", "efficiency")}
+    arrays |= {name: np.ones(n) for name in ("stribeck_velocity", "warm_time", "position_order", "efficiency")}
     arrays |= {name: np.zeros((n, n)) for name in ("coupling_viscous", "coupling_coulomb")}
     arrays |= {name: zero.copy() for name in ("signed_sine_of", "swinging_viscous_of")}
     for family, lengths in FAMILIES.items():

@@ -24,7 +24,7 @@ from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.diagnose import diagnose
 from scara_ident.diagnosis.effect_parameters import Coefficients, physical_parameters
 from scara_ident.effects import Coefficient, Effect, Member
-from scara_ident.effects.friction import AsymmetricFriction
+from scara_ident.effects.friction import AsymmetricFriction, Stribeck
 from scara_ident.effects.periodic import TorqueRipple
 from scara_ident.effects.position import Spring
 from scara_ident.robot.robot import load_robot
@@ -107,12 +107,10 @@ def test_of_those_that_act_together_one_whose_size_is_not_told_falls(monkeypatch
     assert unsettled(found, found.step.weights) == []
     place = next(k for k, item in enumerate(found.chosen) if item.member.joint == 1)
 
-    def unsure(step, *, scatter_alone=False):
-        told = physical_parameters(step, scatter_alone=scatter_alone)
+    def unsure(step, **left_out):
+        told = physical_parameters(step, **left_out)
         effects = [
-            {name: replace(own, std=np.inf) for name, own in sizes.items()}
-            if k == place and not scatter_alone
-            else sizes
+            {name: replace(own, std=np.inf) for name, own in sizes.items()} if k == place and not left_out else sizes
             for k, sizes in enumerate(told.effects)
         ]
         return replace(told, effects=tuple(effects))
@@ -125,6 +123,32 @@ def test_of_those_that_act_together_one_whose_size_is_not_told_falls(monkeypatch
     alone = searched(with_torque(exact_runs(), 1, lambda motion: 0.3 * motion.q[1]), SpringTogether())
     place = 0
     assert unsettled(alone, alone.step.weights) == []
+
+
+@pytest.mark.parametrize(("moved", "stands"), [(0.25, True), (0.5, False)])
+def test_an_effect_that_the_noise_of_positions_moves_by_as_much_falls(
+    moved: float, stands: bool, monkeypatch: pytest.MonkeyPatch
+):
+    """Of a slide behind steps of 1.5 mm a friction of 20 N near rest was found, which their noise moves by 17 N once its speed is free."""
+    rng = np.random.default_rng(3)
+    made = with_torque(
+        exact_runs(), 1, lambda motion: 0.05 * np.sign(motion.v[1]) * np.exp(-((motion.v[1] / 0.2) ** 2))
+    )
+    made = [replace(run, position=run.position + 1e-4 * rng.standard_normal(run.position.shape)) for run in made]
+    found = searched(made, Stribeck())
+    assert [item.label(found.scene) for item in found.chosen] == ["stribeck of joint2"]
+    assert unsettled(found, found.step.weights) == []
+
+    def with_bias(step, *, of_runs=True, of_noise=True):
+        told = physical_parameters(step, of_runs=of_runs, of_noise=False)
+        (own,) = told.coefficients
+        more = np.outer(own.value, own.value) * moved**2 * of_noise
+        return replace(told, coefficients=(replace(own, covariance=own.covariance + more),))
+
+    monkeypatch.setattr(audit, "physical_parameters", with_bias)
+    refused = unsettled(found, found.step.weights)
+    why = "the noise of the positions moves its size by as much once its other parameters are free"
+    assert [item.why.split(":")[0] for item in refused] == ([] if stands else [why])
 
 
 def test_what_was_found_and_refused_leaves_it_open(monkeypatch: pytest.MonkeyPatch):

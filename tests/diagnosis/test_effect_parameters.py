@@ -148,7 +148,7 @@ def test_the_deviation_of_a_coefficient_holds_what_the_noise_of_positions_does()
             wide[-2, own] = WEIGHTS[j] * added[j][0] if j in added else 0.0
         return float(np.linalg.lstsq(wide[:-1].T, wide[-1], rcond=None)[0][-1])
 
-    (whole,), (scatter,) = (physical_parameters(step, scatter_alone=alone).effects for alone in (False, True))
+    (whole,), (scatter,) = (physical_parameters(step, of_noise=counted).effects for counted in (True, False))
     bias = share(step.noisier) - share(step)
     assert abs(bias) > scatter["share"].std
     assert whole["share"].std == pytest.approx(np.hypot(scatter["share"].std, bias), rel=1e-3)

@@ -34,9 +34,13 @@ def interrupted(x: int) -> int:
     return x
 
 
-def test_ctrl_c_in_a_terminal_is_for_who_started_the_processes_alone(capfd):
+def test_ctrl_c_is_for_who_started_the_processes_alone_and_their_environment_for_them(capfd, monkeypatch):
+    monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
+    before = dict(os.environ)
     assert run_all(interrupted, [(1,)], workers=1) == [1]
     assert capfd.readouterr() == ("", "")
+    # What came later in this process was told by it to keep memory as workers do, and to have one BLAS thread.
+    assert dict(os.environ) == before
 
 
 def test_what_raises_hands_on_its_exception_and_what_follows_is_done(cluster, tmp_path):

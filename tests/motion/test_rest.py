@@ -9,6 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from scara_ident.motion.low_pass import low_pass
+from scara_ident.motion.position_noise import noisier
 from scara_ident.motion.prepared import PreparedStretch, prepare
 from scara_ident.motion.rest import FEW_SAMPLES, fading, position_cuts, rest_speeds, slower
 from scara_ident.recording.recording import Recording
@@ -38,6 +39,39 @@ def test_a_joint_that_stops_is_left_out_there_and_no_more(run: Recording):
     assert part.rest[1].mean() < 0.35
     assert not part.rest[0, 2100:2900].all()
     assert not part.used[1, 2100:2900].any()
+
+
+def stepping(run: Recording, step: float, band: float) -> tuple[PreparedStretch, np.ndarray]:
+    """Return a recording, more than half of it rest, in steps of an encoder, and where it moves at 0.7 steps per period of the filter."""
+    slow = 0.7 * 3.0 * band * 2e-3
+    v = np.repeat([0.0, slow, 0.0, 1.0, -1.0, 0.0], [1500, 1000, 2500, 500, 500, 2000])
+    position = np.cumsum(np.vstack([v, v]), axis=1) / RATE
+    position = step * np.round(position / step)
+    time = np.arange(len(v)) / RATE
+    made = replace(run, time=time, position=position, effort=np.zeros(position.shape), velocity=None)
+    return only(made, (band, band)), np.flatnonzero(v == slow)[200:-200]
+
+
+@pytest.mark.parametrize("band", [1.0, 2.0, 5.0])
+def test_where_an_encoder_makes_less_than_a_step_in_a_period_of_the_filter_it_is_at_rest(run: Recording, band: float):
+    """A slide that rested half of the time moved at less than that beside it: its speed went to and fro, and had a Stribeck friction."""
+    part, slow = stepping(run, 2e-3, band)
+    assert part.stretch.steps == pytest.approx((2e-3, 2e-3))
+    # As the filtered positions have it, it goes to and fro.
+    assert np.min(part.motion.v[0, slow]) < 0.0 < np.mean(part.motion.v[0, slow])
+    assert part.rest[:, slow].all()
+    assert not part.rest[:, 5200:5400].any()
+    fine, slow = stepping(run, 2e-5, band)
+    assert not fine.rest[:, slow].any()
+
+
+def test_positions_with_their_noise_once_more_rest_where_they_did(run: Recording):
+    part, slow = stepping(run, 2e-3, 2.0)
+    data = prepare(
+        [replace(run, time=part.stretch.time, position=part.stretch.position, effort=part.torque)], (2.0, 2.0)
+    )
+    (again,) = noisier(data).stretches
+    assert again.stretch.steps == part.stretch.steps and again.rest[:, slow].all()
 
 
 def turning(

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
 from scara_ident.simulation.arm import VirtualArm
-from scara_ident.simulation.effects.effect import BY_ARM, Effect
+from scara_ident.simulation.effects.effect import BY_ARM, Effect, Vector
 from scara_ident.simulation.plant import PlantDraft
 
 
@@ -45,15 +46,15 @@ class Spring(Effect):
 
     name: ClassVar[str] = "spring"
     units: ClassVar[dict[str, str]] = {"stiffness": "N m/rad", "rest_position": "rad"}
+    ways: ClassVar[dict[str, float]] = {"rest_position": 0.3}
     arrays: ClassVar[dict[str, str]] = {"stiffness": "spring", "rest_position": "spring_rest"}
     joint_side = ("stiffness",)
     stiffness: float = BY_ARM
-    rest_position: float = 0.3
+    rest_position: float = BY_ARM
 
-    def sizes(self, arm: VirtualArm, joint: int) -> dict[str, float]:
-        """Give a share of the usual torque over a radian, or over a tenth of a metre."""
-        way = 0.1 if arm.robot.prismatic[joint] else 1.0
-        return {"stiffness": float(0.1 * arm.torque_scale[joint]) / way}
+    def sizes(self, arm: VirtualArm, joint: int) -> Mapping[str, float | Vector]:
+        """Give a share of the usual torque over a radian, or over as much of a slide's stroke."""
+        return {**super().sizes(arm, joint), "stiffness": float(0.1 * arm.torque_scale[joint] / arm.radian[joint])}
 
 
 @dataclass(frozen=True)

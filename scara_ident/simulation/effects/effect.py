@@ -36,6 +36,8 @@ class Effect:
     whole_arm: ClassVar[Literal["never", "may be", "always"]] = "never"
     # Parameter left to the arm -> share of its usual torque.
     shares: ClassVar[dict[str, float]] = {}
+    # Parameter left to the arm -> multiple of what goes with a radian of the joint, see `VirtualArm.radian`.
+    ways: ClassVar[dict[str, float]] = {}
     # Parameter -> array of the draft into which it is written; those that are brought to the joint side of the gear.
     arrays: ClassVar[dict[str, str]] = {}
     joint_side: ClassVar[tuple[str, ...]] = ()
@@ -53,7 +55,8 @@ class Effect:
 
     def sizes(self, arm: VirtualArm, joint: int) -> Mapping[str, float | Vector]:
         """Return values for the parameters that are left to the arm."""
-        return {key: float(share * arm.torque_scale[joint]) for key, share in self.shares.items()}
+        sizes = {key: float(share * arm.torque_scale[joint]) for key, share in self.shares.items()}
+        return sizes | {key: float(way * arm.radian[joint]) for key, way in self.ways.items()}
 
     def first_choice(self, arm: VirtualArm) -> str:
         """Return the joint meant where none is named."""

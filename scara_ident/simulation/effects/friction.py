@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
 from scara_ident.simulation.arm import VirtualArm
-from scara_ident.simulation.effects.effect import BY_ARM, Effect, neighbour, vacant
+from scara_ident.simulation.effects.effect import BY_ARM, Effect, Vector, neighbour, vacant
 from scara_ident.simulation.plant import PlantDraft
 
 
@@ -19,14 +20,16 @@ class Stribeck(Effect):
     name: ClassVar[str] = "stribeck"
     units: ClassVar[dict[str, str]] = {"amplitude": "N m", "velocity": "rad/s"}
     bounds: ClassVar[dict[str, tuple[float, float]]] = {"amplitude": (0.0, np.inf), "velocity": (1e-6, np.inf)}
+    ways: ClassVar[dict[str, float]] = {"velocity": 0.1}
     arrays: ClassVar[dict[str, str]] = {"amplitude": "stribeck_amplitude", "velocity": "stribeck_velocity"}
     joint_side = ("amplitude",)
     amplitude: float = BY_ARM
-    velocity: float = 0.1
+    velocity: float = BY_ARM
 
-    def sizes(self, arm: VirtualArm, joint: int) -> dict[str, float]:
+    def sizes(self, arm: VirtualArm, joint: int) -> Mapping[str, float | Vector]:
         """Give half of the Coulomb friction, or a share of the torque where there is none."""
-        return {"amplitude": float(0.5 * arm.friction[joint, 0] or 0.05 * arm.torque_scale[joint])}
+        amplitude = float(0.5 * arm.friction[joint, 0] or 0.05 * arm.torque_scale[joint])
+        return {**super().sizes(arm, joint), "amplitude": amplitude}
 
 
 @dataclass(frozen=True)
@@ -62,8 +65,9 @@ class Presliding(Effect):
     name: ClassVar[str] = "presliding"
     units: ClassVar[dict[str, str]] = {"presliding_distance": "rad"}
     bounds: ClassVar[dict[str, tuple[float, float]]] = {"presliding_distance": (0.0, np.inf)}
+    ways: ClassVar[dict[str, float]] = {"presliding_distance": 0.005}
     arrays: ClassVar[dict[str, str]] = {"presliding_distance": "presliding"}
-    presliding_distance: float = 0.005
+    presliding_distance: float = BY_ARM
 
 
 @dataclass(frozen=True)
@@ -80,7 +84,10 @@ class WarmUp(Effect):
 
 @dataclass(frozen=True)
 class PositionDependentFriction(Effect):
-    """Coulomb friction that varies with the joint's position: a0 times ``1 + share sin(q + phase)``."""
+    """Coulomb friction that varies with the joint's position: a0 times ``1 + share sin(q + phase)``.
+
+    Where the joint slides, q is ``pi`` times its position over its stroke.
+    """
 
     name: ClassVar[str] = "position_dependent_friction"
     units: ClassVar[dict[str, str]] = {"share": "1", "phase": "rad"}
@@ -88,6 +95,13 @@ class PositionDependentFriction(Effect):
     arrays: ClassVar[dict[str, str]] = {"share": "position_share", "phase": "position_phase"}
     share: float = 0.3
     phase: float = 0.5
+
+    def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:
+        """Set share and phase, and over which way they are."""
+        super().apply(arm, draft)
+        draft.array("position_order")[self.place(arm)] = (
+            1.0 / arm.radian[arm.robot.joint_index(self.joint or arm.robot.joints[0])]
+        )
 
 
 @dataclass(frozen=True)
@@ -105,8 +119,10 @@ class FrictionCoupling(Effect):
     def sizes(self, arm: VirtualArm, joint: int) -> dict[str, float]:
         """Give small shares of the joint's own friction."""
         scale = float(arm.torque_scale[joint])
+        # By the other joint's speed, which may be in another unit.
+        way = float(arm.radian[joint] / arm.radian[arm.robot.joint_index(self.other(arm))])
         return {
-            "viscous": float(0.3 * arm.friction[joint, 1] or 0.02 * scale),
+            "viscous": float(0.3 * arm.friction[joint, 1] * way or 0.02 * scale),
             "coulomb": float(0.15 * arm.friction[joint, 0] or 0.02 * scale),
         }
 

@@ -58,6 +58,8 @@ class TorqueGainMismatch(Effect):
 
     def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:
         """Set the gain."""
+        if arm.robot.n < 2:
+            raise UsageError(f"{self.name}: {arm.robot.name} has one joint; a ratio of scales needs two")
         if self.joint == arm.robot.joints[0]:
             raise UsageError(
                 f"{self.name}: the ratio is to the first joint's scale; name a joint other than {self.joint}"
@@ -114,8 +116,9 @@ class JointZero(Effect):
 
     name: ClassVar[str] = "joint_zero"
     units: ClassVar[dict[str, str]] = {"offset": "rad"}
+    ways: ClassVar[dict[str, float]] = {"offset": 0.05}
     arrays: ClassVar[dict[str, str]] = {"offset": "zero"}
-    offset: float = 0.05
+    offset: float = BY_ARM
 
     def first_choice(self, arm: VirtualArm) -> str:
         """Take the second joint: of no arm with a vertical first axis the torque depends on where that points."""

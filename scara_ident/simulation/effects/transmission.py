@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -9,7 +10,7 @@ import numpy as np
 
 from scara_ident.errors import UsageError
 from scara_ident.simulation.arm import VirtualArm
-from scara_ident.simulation.effects.effect import BY_ARM, Effect, vacant
+from scara_ident.simulation.effects.effect import BY_ARM, Effect, Vector, vacant
 from scara_ident.simulation.plant import PlantDraft
 
 
@@ -92,18 +93,20 @@ class Backlash(Effect):
 
     name: ClassVar[str] = "backlash"
     units: ClassVar[dict[str, str]] = {"width": "rad", "contact_stiffness": "N m/rad", "contact_damping_ratio": "1"}
+    ways: ClassVar[dict[str, float]] = {"width": 0.001}
     bounds: ClassVar[dict[str, tuple[float, float]]] = {
         "width": (0.0, np.inf),
         "contact_stiffness": (1e-6, np.inf),
         "contact_damping_ratio": (0.0, 5.0),
     }
-    width: float = 0.001
+    width: float = BY_ARM
     contact_stiffness: float = BY_ARM
     contact_damping_ratio: float = 0.3
 
-    def sizes(self, arm: VirtualArm, joint: int) -> dict[str, float]:
+    def sizes(self, arm: VirtualArm, joint: int) -> Mapping[str, float | Vector]:
         """Give a contact resonance of 80 Hz."""
-        return {"contact_stiffness": float((2 * np.pi * 80.0) ** 2 * _reduced_inertia(arm, joint))}
+        stiffness = float((2 * np.pi * 80.0) ** 2 * _reduced_inertia(arm, joint))
+        return {**super().sizes(arm, joint), "contact_stiffness": stiffness}
 
     def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:
         """Open the clearance."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -16,7 +18,7 @@ from scara_ident.simulation import (
     virtual_arm,
 )
 from scara_ident.simulation import effects as fx
-from tests.arms import example_urdf
+from tests.arms import CYLINDRICAL, PLANAR_2R, example_urdf, in_unit, write_urdf
 from tests.simulation.effects.runs import run
 from tests.simulation.made import left_over, scara, swing
 
@@ -130,6 +132,37 @@ def test_an_effect_that_does_not_fit_is_one_line(effects: list[str], said: str |
         return
     with pytest.raises(UsageError, match=said) as caught:
         simulate(scara(), swing(scara().robot, 0.1), effects=chosen)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("unit", [0.05, 20.0])
+def test_lengths_that_an_effect_of_a_slide_has_are_shares_of_its_stroke(unit: float, tmp_path: Path) -> None:
+    # What they are of a joint that turns, rad.
+    lengths = {
+        ("stribeck", "velocity"): 0.1, ("presliding", "presliding_distance"): 0.005, ("backlash", "width"): 0.001,
+        ("spring", "rest_position"): 0.3, ("joint_zero", "offset"): 0.05,
+    }  # fmt: skip
+    arm = virtual_arm(in_unit(CYLINDRICAL, unit, tmp_path))
+    for (name, key), turn in lengths.items():
+        sizes = [EFFECTS[name](joint).resolve(arm).as_dict()["parameters"][key] for joint in ("j1", "j3")]
+        assert sizes == pytest.approx([turn, turn * 6.0 * unit / np.pi]), name
+    stiffness = fx.Spring("j3").resolve(arm).stiffness
+    assert stiffness * 6.0 * unit / np.pi == pytest.approx(0.1 * arm.torque_scale[2])
+    # Friction that varies with the position goes through half a period over the stroke.
+    draft = arm.draft()
+    for joint in ("j1", "j3"):
+        fx.PositionDependentFriction(joint).apply(arm, draft)
+    np.testing.assert_allclose(draft.array("position_order")[arm.robot.order], [1.0, 1.0, np.pi / (6.0 * unit)])
+    # Of the friction that a slide's speed drives on a joint that turns.
+    viscous = fx.FrictionCoupling("j1").resolve(arm).viscous
+    assert viscous * arm.radian[1] == pytest.approx(0.3 * arm.friction[0, 1])
+
+
+@pytest.mark.parametrize("name", ["torque_gain_mismatch", "friction_coupling"])
+def test_what_needs_two_joints_is_refused_in_a_line_of_an_arm_of_one(name: str, tmp_path: Path) -> None:
+    arm = virtual_arm(load_robot(write_urdf(tmp_path / "arm.urdf", PLANAR_2R[:1])))
+    with pytest.raises(UsageError, match=r"test_arm has one joint; .* needs two") as caught:
+        simulate(arm, swing(arm.robot, 0.1), effects=[EFFECTS[name]()])
     assert "\n" not in str(caught.value)
 
 
