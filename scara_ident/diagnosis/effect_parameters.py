@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.candidate_tests import examine
 from scara_ident.diagnosis.candidates import Candidate, Rows
-from scara_ident.diagnosis.linearised import Linearised, linearise
+from scara_ident.diagnosis.linearised import Linearised, linearise, with_estimate_slopes
 from scara_ident.diagnosis.nonlinear_fit import tune
 from scara_ident.diagnosis.selection_step import SelectionStep
 from scara_ident.diagnosis.unknowns import sides
@@ -98,8 +98,10 @@ def physical_parameters(step: SelectionStep, *, scatter_alone: bool = False) -> 
     covariance is that of all parameters together.
     """
     state = linearise(step)
-    covariance = _covariance(step, state, scatter_alone=scatter_alone)
-    undetermined = merge([state.information, state.prior]).solve().undetermined
+    # None of it is asked of an effect that is not there, whose torque does not change with what its columns follow.
+    free = state if scatter_alone else with_estimate_slopes(step, state)
+    covariance = _covariance(step, free, scatter_alone=scatter_alone)
+    undetermined = merge([free.information, free.prior]).solve().undetermined
     found: list[dict[str, Parameter]] = []
     coefficients = []
     for owner, (candidate, own) in enumerate(zip(step.chosen, state.places, strict=True)):
@@ -212,7 +214,9 @@ def _noise_bias(step: SelectionStep, state: Linearised) -> Array:
     if max(noise_shares(step.observations.data), default=0.0) < NEGLIGIBLE:
         return np.zeros(state.information.parameters)
     # A resonance with little damping bends too much for one step.
-    again = linearise(tune(step.noisier) if len(state.ties.factor) else step.noisier)
+    tied = any(item.effect.tie(step.scene, item.member) is not None for item in step.chosen)
+    noisier = tune(step.noisier) if tied else step.noisier
+    again = with_estimate_slopes(noisier, linearise(noisier))
     bias = again.solve()[0] - state.solve()[0]
     bias[state.linear :] += [
         there.value - here.value for there, here in zip(again.unknowns, state.unknowns, strict=True)

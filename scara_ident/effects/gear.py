@@ -35,7 +35,7 @@ class TransmissionLoss(Effect):
             LARGEST_LOSS_SHARE, "over three quarters of the torque would be lost",
         ),
     )  # fmt: skip
-    nonlinear = (NonlinearParameter("_lost_share", "1", 0.005, LARGEST_LOSS_SHARE),)
+    nonlinear = (NonlinearParameter("_lost_share", "1", 0.005, LARGEST_LOSS_SHARE, of_coefficient=True),)
     at_rest = True
     follows_estimate = True
     of_load = True
