@@ -90,18 +90,20 @@ def physical_parameters(step: SelectionStep, *, scatter_alone: bool = False) -> 
     Parameters
     ----------
     scatter_alone : bool, optional
-        Whether standard deviations leave out what runs differ by and what the noise of the positions does.
+        Whether standard deviations leave out what runs differ by, what the noise of the positions does and what is unsure
+        of the parameters that columns follow: an effect that is not there changes with none of these.
 
     Notes
     -----
     Nonlinear parameters, armatures included, join the fit by the derivative of the effects' columns, so that the
-    covariance is that of all parameters together.
+    covariance is that of all parameters together. Where columns follow the estimate, values are a step of Gauss and Newton
+    from that which the fit settled at, to the least squares whose covariance it is.
     """
     state = linearise(step)
-    # None of it is asked of an effect that is not there, whose torque does not change with what its columns follow.
-    free = state if scatter_alone else with_estimate_slopes(step, state)
-    covariance = _covariance(step, free, scatter_alone=scatter_alone)
-    undetermined = merge([free.information, free.prior]).solve().undetermined
+    if not scatter_alone:
+        state = with_estimate_slopes(step, state)
+    covariance = _covariance(step, state, scatter_alone=scatter_alone)
+    undetermined = merge([state.information, state.prior]).solve().undetermined
     found: list[dict[str, Parameter]] = []
     coefficients = []
     for owner, (candidate, own) in enumerate(zip(step.chosen, state.places, strict=True)):
