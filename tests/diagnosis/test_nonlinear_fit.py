@@ -20,6 +20,7 @@ from scara_ident.effects.elasticity import Backlash, JointElasticity
 from scara_ident.effects.friction import Stribeck
 from scara_ident.effects.gear import TransmissionLoss
 from scara_ident.effects.links import tool_of, usual_link_inertia
+from scara_ident.effects.measurement import TorqueSensorNonlinearity
 from scara_ident.effects.payload import PayloadOfRecordings
 from scara_ident.effects.position import Spring
 from scara_ident.model.model import build_model
@@ -347,3 +348,11 @@ def test_a_coarse_fit_goes_on_where_a_step_was_cut_short_that_the_model_promises
     monkeypatch.setattr(module, "at_estimate", lambda *_: step.scene)
     tune(step, coarse=True)
     assert [item.error for item in seen] == [100.0, 99.5, 99.0]
+
+
+def test_a_strong_effect_whose_columns_follow_the_estimate_settles() -> None:
+    """By columns made anew of each estimate it had come to 9 when the rounds were over."""
+    cubic = 12.0
+    runs = [replace(run, effort=run.effort + np.outer([0.0, cubic], run.effort[1] ** 3)) for run in exact_runs()]
+    step = tuned(runs, Candidate(TorqueSensorNonlinearity(), Member(1)))
+    assert linear(step).value[-1] == pytest.approx(cubic, rel=0.05)
