@@ -148,6 +148,19 @@ class CandidateColumns:
         parts = [part for part in self.observations.data.stretches if part.usable]
         return tuple(np.concatenate(own, axis=1) for own in zip(*side_by_side(on_stretch, parts), strict=True))
 
+    def estimate_slopes(self, scene: Scene, candidate: Candidate, value: Array) -> tuple[Array, ...]:
+        """Return an untied candidate's `Effect.estimate_slopes` within the bands, shape (p, N) on the N rows of each joint."""
+        effect, member = candidate.effect, candidate.member
+
+        def on_stretch(part: PreparedStretch) -> list[Array]:
+            found = [np.zeros((len(scene.value), len(own))) for own in part.kept]
+            for joint, (places, rows) in effect.estimate_slopes(self._signals_of(scene, part), member, value).items():
+                found[joint][places] = part.rows(joint, rows)
+            return found
+
+        parts = [part for part in self.observations.data.stretches if part.usable]
+        return tuple(np.concatenate(own, axis=1) for own in zip(*side_by_side(on_stretch, parts), strict=True))
+
     def predicted(self, scene: Scene, chosen: Sequence[Candidate], value: Array) -> tuple[Array, ...]:
         """Return the torque that the base model with effects predicts on every stretch, shape (n, N) each."""
         start = self.observations.parameters

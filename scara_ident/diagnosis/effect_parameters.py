@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.candidate_tests import examine
 from scara_ident.diagnosis.candidates import Candidate, Rows
-from scara_ident.diagnosis.linearised import Linearised, linearise
+from scara_ident.diagnosis.linearised import Linearised, linearise, with_estimate_slopes
 from scara_ident.diagnosis.nonlinear_fit import tune
 from scara_ident.diagnosis.selection_step import SelectionStep
 from scara_ident.diagnosis.unknowns import sides
@@ -90,14 +90,18 @@ def physical_parameters(step: SelectionStep, *, of_runs: bool = True, of_noise: 
     Parameters
     ----------
     of_runs, of_noise : bool, optional
-        Whether standard deviations hold what runs differ by, and what the noise of the positions moves parameters by.
+        Whether standard deviations hold what runs differ by, and what the noise of the positions moves parameters by. With neither,
+        what is unsure of the parameters that columns follow is left out too: an effect that is not there changes with none of it.
 
     Notes
     -----
     Nonlinear parameters, armatures included, join the fit by the derivative of the effects' columns, so that the
-    covariance is that of all parameters together.
+    covariance is that of all parameters together. Where columns follow the estimate, values are a step of Gauss and Newton
+    from that which the fit settled at, to the least squares whose covariance it is.
     """
     state = linearise(step)
+    if of_runs or of_noise:
+        state = with_estimate_slopes(step, state)
     covariance = _covariance(step, state, of_runs=of_runs, of_noise=of_noise)
     undetermined = merge([state.information, state.prior]).solve().undetermined
     found: list[dict[str, Parameter]] = []
@@ -214,7 +218,9 @@ def _noise_bias(step: SelectionStep, state: Linearised) -> Array:
     if max(noise_shares(step.observations.data), default=0.0) < NEGLIGIBLE:
         return np.zeros(state.information.parameters)
     # A resonance with little damping bends too much for one step.
-    again = linearise(tune(step.noisier) if len(state.ties.factor) else step.noisier)
+    tied = any(item.effect.tie(step.scene, item.member) is not None for item in step.chosen)
+    noisier = tune(step.noisier) if tied else step.noisier
+    again = with_estimate_slopes(noisier, linearise(noisier))
     bias = again.solve()[0] - state.solve()[0]
     bias[state.linear :] += [
         there.value - here.value for there, here in zip(again.unknowns, state.unknowns, strict=True)

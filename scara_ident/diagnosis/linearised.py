@@ -164,7 +164,9 @@ def linearise(step: SelectionStep) -> Linearised:
         tie = candidate.effect.tie(scene, candidate.member)
         if tie is not None:
             slopes[owner] = columns.slopes(scene, candidate)
-            joints = _with_slopes(joints, slopes[owner], scene)
+            place = scene.model.place(scene.model.rigid_body)
+            by_bodies = [own[: place.stop - place.start] for own in slopes[owner]]
+            joints = _with_slopes(joints, by_bodies, place.start, scene)
             size = _size(joints, int(bounds[owner]), weights)
             ties.append(TIGHTNESS * size * _tie_row(scene, chosen, unknowns, owner, tie, int(bounds[owner]), linear))
     held = Information(np.array(ties).reshape(-1, total + 1), 0.0)
@@ -173,6 +175,33 @@ def linearise(step: SelectionStep) -> Linearised:
     extended = tuple(_beside(rows, joint, changes, linear) for joint, rows in enumerate(joints))
     information = _pooled(extended, total, weights, step.offsets)
     return Linearised(scene, chosen, unknowns, places, extended, information, held)
+
+
+def with_estimate_slopes(step: SelectionStep, state: Linearised) -> Linearised:
+    """Return the model of a step, linear about the parameters of the base model too where columns follow these.
+
+    Nonlinear parameters that are a coefficient once more change with it: free, they may be one with what columns follow.
+
+    Parameters
+    ----------
+    state : Linearised
+        As `linearise` returns it, to which such columns are given.
+    """
+    scene, joints = step.scene, state.joints
+    for candidate, place in zip(step.chosen, state.places, strict=True):
+        if candidate.effect.follows_estimate and candidate.effect.tie(scene, candidate.member) is None:
+            joints = _with_slopes(joints, step.columns.estimate_slopes(scene, candidate, state.value[place]), 0, scene)
+    if joints is state.joints:
+        return state
+    rows = []
+    for k, item in enumerate(state.unknowns, state.linear):
+        if item.owner is not None and step.chosen[item.owner].effect.nonlinear[item.place].of_coefficient:
+            row, column = np.zeros(state.information.parameters + 1), state.places[item.owner].start
+            row[[column, k, -1]] = 1.0, -1.0, state.value[column]
+            rows.append(TIGHTNESS * _size(joints, column, step.weights) * row)
+    ties = merge([state.ties, Information(np.array(rows), 0.0)]) if rows else state.ties
+    information = _pooled(joints, state.information.parameters, step.weights, step.offsets)
+    return replace(state, joints=joints, information=information, ties=ties)
 
 
 def freed_model(step: SelectionStep) -> FittedModel:
@@ -190,22 +219,29 @@ def _solved(information: Information, ties: Information, linear: int) -> Array:
     return merge([information.select(range(linear)), held]).solve().value
 
 
-def _with_slopes(joints: Sequence[JointRows], slopes: Sequence[Array], scene: Scene) -> tuple[JointRows, ...]:
-    """Return rows whose columns of the rigid bodies have what an effect's torque changes by with their parameters.
+def _with_slopes(
+    joints: Sequence[JointRows], slopes: Sequence[Array], start: int, scene: Scene
+) -> tuple[JointRows, ...]:
+    """Return rows whose columns of the base model have what an effect's torque changes by with its parameters.
 
     The torque has it too, at the present parameters, so that what is left stays what it is.
+
+    Parameters
+    ----------
+    slopes : sequence of ndarray, shape (k, N)
+        Of each joint, by k parameters of the base model.
+    start : int
+        Place of the first of these.
     """
-    place = scene.model.place(scene.model.rigid_body)
     found = []
-    for rows, all_slopes in zip(joints, slopes, strict=True):
-        own = all_slopes[: place.stop - place.start]
-        bodies = np.arange(place.start, place.stop)
-        missing = bodies[~np.isin(bodies, rows.columns) & np.any(own != 0.0, axis=1)]
+    for rows, own in zip(joints, slopes, strict=True):
+        some = np.arange(start, start + len(own))
+        missing = some[~np.isin(some, rows.columns) & np.any(own != 0.0, axis=1)]
         places = np.concatenate([rows.columns, missing])
         table = np.concatenate([rows.table[:-1], np.zeros((len(missing), rows.table.shape[1])), rows.table[-1:]])
-        inside = (places >= place.start) & (places < place.stop)
-        table[:-1][inside] += own[places[inside] - place.start]
-        table[-1] += scene.value[place] @ own
+        inside = (places >= start) & (places < start + len(own))
+        table[:-1][inside] += own[places[inside] - start]
+        table[-1] += scene.value[some] @ own
         found.append(JointRows(places, table, rows.starts, rows.counts))
     return tuple(found)
 

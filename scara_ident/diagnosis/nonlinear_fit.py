@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.at_estimate import at_estimate, estimate_of, without_others
-from scara_ident.diagnosis.linearised import Linearised, linearise, moved_candidate
+from scara_ident.diagnosis.linearised import Linearised, linearise, moved_candidate, with_estimate_slopes
 from scara_ident.diagnosis.selection_step import SelectionStep
 
 # Steps of Gauss and Newton; most fits settle in three, and a search has further ones. A tied effect comes from far away.
@@ -67,7 +67,7 @@ def tune(step: SelectionStep, *, coarse: bool = False) -> SelectionStep:
             near = coarse and (share == 1.0 or now.gain(way) < LEAST_FALL)
             arrived = near and best is not None and best.error - now.error < LEAST_FALL * best.error
             best = now
-            if _settled(now, way, std, settling):
+            if _is_short(now, way, std, settling):
                 if _share(now, way) < 1.0:
                     break
                 # So short a step needs no look at where it leads.
@@ -82,10 +82,32 @@ def tune(step: SelectionStep, *, coarse: bool = False) -> SelectionStep:
         share = _share(best, way)
         step = _moved(step, best, way, share)
     assert best is not None
-    return replace(step, scene=at_estimate(best.scene, best.chosen, best.value), chosen=best.chosen)
+    step = replace(step, scene=at_estimate(best.scene, best.chosen, best.value), chosen=best.chosen)
+    return step if coarse else _settled(step)
 
 
-def _settled(state: Linearised, way: Array, std: Array, settling: NDArray[np.intp]) -> bool:
+def _settled(step: SelectionStep) -> SelectionStep:
+    """Return a step that did not settle by itself with the linear parameters settled, the nonlinear ones as they are.
+
+    Columns that are made anew of each estimate lead there slowly where their effect is strong: these steps know how they change.
+    """
+    best, error = step, np.inf
+    for _ in range(ROUNDS):
+        plain = linearise(step)
+        state = with_estimate_slopes(step, plain)
+        if state is plain or plain.error > error:
+            break
+        best, error = step, plain.error
+        started, std = estimate_of(step.scene, step.chosen), state.solve()[1][: state.linear]
+        # What follows it is compared, which is the base model's.
+        own = slice(0, step.observations.parameters)
+        if np.all(np.abs(state.value[own] - started[own]) <= SETTLED * std[own]):
+            break
+        step = replace(step, scene=at_estimate(step.scene, step.chosen, state.value))
+    return best
+
+
+def _is_short(state: Linearised, way: Array, std: Array, settling: NDArray[np.intp]) -> bool:
     """Whether a way is so short that it needs no look at where it leads.
 
     Linear parameters that columns follow are to be near; nonlinear ones each, or so that all of them together promise next to nothing.

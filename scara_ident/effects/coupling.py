@@ -10,6 +10,7 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.effects.effect import Effect
+from scara_ident.effects.following import EstimateSlopes, predicted_slopes
 from scara_ident.effects.parameters import Coefficient, Member
 from scara_ident.effects.signals import Scene, Signals
 from scara_ident.effects.spanned import Span, random_motion, rows_by_sample
@@ -82,6 +83,13 @@ class DriveCoupling(Effect):
         j, k = member.place, member.partner_place
         scale = signals.scene.robot.row_scale
         return [signals.predicted[k] * (scale[j] / scale[k])]
+
+    def estimate_slopes(self, signals: Signals, member: Member, value: Array) -> EstimateSlopes:
+        """Return those of the other joint's torque."""
+        j, k = member.place, member.partner_place
+        scale = signals.scene.robot.row_scale
+        places, rows = predicted_slopes(signals, k)
+        return {j: (places, value[0] * (scale[j] / scale[k]) * rows)}
 
 
 def _exchanged(scale: Array, a: Array, j: int, k: int) -> Array:

@@ -8,7 +8,8 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.effects.effect import DOUBT_STDS, Effect
-from scara_ident.effects.friction import friction_of, friction_torque
+from scara_ident.effects.following import EstimateSlopes, predicted_slopes, some_slopes
+from scara_ident.effects.friction import friction_of, friction_places, friction_torque
 from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, Parameter, View, deviation
 from scara_ident.effects.position import offset_of
 from scara_ident.effects.signals import Scene, Signals
@@ -60,6 +61,12 @@ class WarmUp(Effect):
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
         """Return the predicted friction times ``exp(-t/time_constant)``."""
         return [friction_torque(signals, member.place) * np.exp(-signals.time / member.nonlinear[0])]
+
+    def estimate_slopes(self, signals: Signals, member: Member, value: Array) -> EstimateSlopes:
+        """Return those by the joint's friction."""
+        own = np.array(list(friction_places(signals.scene, member.place).values()))
+        places, rows = some_slopes(predicted_slopes(signals, member.place), own)
+        return {member.place: (places, value[0] * np.exp(-signals.time / member.nonlinear[0]) * rows)}
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """Say so where friction rises, or falls by too much, too fast or too late."""

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
+from scara_ident.effects.following import EstimateSlopes, slopes_by_differences
 from scara_ident.effects.parameters import OWN, Coefficient, Member, NonlinearParameter, Parameter, Tie, View, deviation
 from scara_ident.effects.signals import Scene, Signals
 from scara_ident.errors import ScaraIdentError
@@ -324,6 +325,13 @@ class Effect(ABC):
             Places among the ``p + 1 + s`` of `Tie.slopes`, and the derivatives by these; all others are zero.
         """
         raise NotImplementedError(f"{self.name} is tied and has no slopes")
+
+    def estimate_slopes(self, signals: Signals, member: Member, value: Array) -> EstimateSlopes:
+        """Return the derivatives of an untied member's torque, its coefficients (k,) held, by the base model's parameters.
+
+        Asked of a family with `follows_estimate`. Unless it says them, differences of its columns do, which takes longer.
+        """
+        return slopes_by_differences(self, signals, member, value)
 
     def instead(self, scene: Scene, member: Member) -> tuple[tuple[Member, Member], ...]:
         """Return two members of which one alone may have taken up what both do, to begin a fit of both, the likeliest first.

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scara_ident.arrays import Array
 from scara_ident.effects.effect import DOUBT_STDS, Effect
 from scara_ident.effects.flight import FreeLink
+from scara_ident.effects.following import EstimateSlopes
 from scara_ident.effects.links import usual_link_inertia, usual_link_inertia_slopes
 from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, Parameter, Tie, View, deviation
 from scara_ident.effects.second_encoder import gear_stiffness
@@ -60,6 +61,10 @@ class BehindGear(Effect):
     def geared_joint(self, member: Member) -> int:
         """Return its joint."""
         return member.place
+
+    def estimate_slopes(self, signals: Signals, member: Member, value: Array) -> EstimateSlopes:
+        """Return none: its tie says what follows from the bodies, and without one it has no torque."""
+        return {}
 
 
 class JointElasticity(BehindGear):

@@ -29,13 +29,18 @@ SHORTEST_TRAVEL = 0.3
 ALL_PAIRS_UP_TO = 3
 
 
-def friction_of(scene: Scene, joint: int) -> dict[int, float]:
-    """Return the present estimate of a joint's friction: coefficient by power of speed; empty without a friction term."""
+def friction_places(scene: Scene, joint: int) -> dict[int, int]:
+    """Return where a joint's friction stands among the base model's parameters, by power of speed; empty without a term of it."""
     for term in scene.model.terms:
         if isinstance(term, Friction):
             first = scene.model.place(term).start + joint * len(term.powers)
-            return {power: float(scene.value[first + k]) for k, power in enumerate(term.powers)}
+            return {power: first + k for k, power in enumerate(term.powers)}
     return {}
+
+
+def friction_of(scene: Scene, joint: int) -> dict[int, float]:
+    """Return the present estimate of a joint's friction: coefficient by power of speed; empty without a friction term."""
+    return {power: float(scene.value[place]) for power, place in friction_places(scene, joint).items()}
 
 
 def friction_torque(signals: Signals, joint: int) -> Array:

@@ -8,6 +8,7 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.effects.effect import Effect
+from scara_ident.effects.following import EstimateSlopes, predicted_slopes, some_slopes
 from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, View
 from scara_ident.effects.signals import Scene, Signals
 
@@ -34,7 +35,7 @@ class TransmissionLoss(Effect):
             LARGEST_LOSS_SHARE, "over three quarters of the torque would be lost",
         ),
     )  # fmt: skip
-    nonlinear = (NonlinearParameter("_lost_share", "1", 0.005, LARGEST_LOSS_SHARE),)
+    nonlinear = (NonlinearParameter("_lost_share", "1", 0.005, LARGEST_LOSS_SHARE, of_coefficient=True),)
     at_rest = True
     follows_estimate = True
     of_load = True
@@ -52,6 +53,16 @@ class TransmissionLoss(Effect):
         j, share = member.place, member.nonlinear[0]
         load = signals.load(j)
         return [np.abs(load) * signals.sign[j] + (np.sqrt(1.0 + share**2) - 1.0) / share * load]
+
+    def estimate_slopes(self, signals: Signals, member: Member, value: Array) -> EstimateSlopes:
+        """Return those by the rigid bodies, which load the gear but for the own rotor; what else acts on links is held."""
+        j, share, scene = member.place, member.nonlinear[0], signals.scene
+        place = scene.model.place(scene.model.rigid_body)
+        bodies = np.arange(place.start, place.stop)
+        places, rows = some_slopes(predicted_slopes(signals, j), bodies)
+        rotor = scene.armature_slopes(j)[places - place.start, None] * scene.robot.row_scale[j] * signals.motion.a[j]
+        along = np.sign(signals.load(j)) * signals.sign[j] + (np.sqrt(1.0 + share**2) - 1.0) / share
+        return {j: (places, value[0] * along * (rows - rotor))}
 
     def geared_joint(self, member: Member) -> int:
         """Return its joint."""

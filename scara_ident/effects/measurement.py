@@ -11,6 +11,7 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.effects.effect import DOUBT_STDS, Effect
+from scara_ident.effects.following import EstimateSlopes, predicted_slopes
 from scara_ident.effects.parameters import Coefficient, Member, Parameter, View, deviation
 from scara_ident.effects.scale_groups import scale_groups
 from scara_ident.effects.signals import Scene, Signals
@@ -66,6 +67,11 @@ class TorqueSensorNonlinearity(Effect):
         """Return the cube of the predicted torque."""
         return [signals.predicted[member.place] ** 3]
 
+    def estimate_slopes(self, signals: Signals, member: Member, value: Array) -> EstimateSlopes:
+        """Return those of the cube."""
+        places, rows = predicted_slopes(signals, member.place)
+        return {member.place: (places, 3.0 * value[0] * signals.predicted[member.place] ** 2 * rows)}
+
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """Say so where what is recorded does not grow with the torque, up to the torque limit."""
         limit = float(scene.robot.torque_limit[member.place])
@@ -117,6 +123,11 @@ class TorqueGainMismatch(Effect):
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
         """Return the predicted torque."""
         return [signals.predicted[member.place]]
+
+    def estimate_slopes(self, signals: Signals, member: Member, value: Array) -> EstimateSlopes:
+        """Return the coefficient times those of the predicted torque."""
+        places, rows = predicted_slopes(signals, member.place)
+        return {member.place: (places, value[0] * rows)}
 
     def told_beside(self, scene: Scene, member: Member) -> Member | None:
         """Return that of the first joint, to whose scale the ratio is."""
@@ -184,6 +195,11 @@ class TimeDelay(Effect):
         rows = slice(None) if member.joint is None else slice(member.joint, member.joint + 1)
         change = lacking(signals, signals.predicted[rows])
         return [change if member.joint is None else change[0]]
+
+    def estimate_slopes(self, signals: Signals, member: Member, value: Array) -> EstimateSlopes:
+        """Return what each of the base model's columns lacks."""
+        found = {joint: predicted_slopes(signals, joint) for joint in self.rows(signals.scene, member)}
+        return {joint: (places, value[0] * lacking(signals, rows)) for joint, (places, rows) in found.items()}
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """Say so where no loop is that late."""

@@ -35,6 +35,8 @@ class NonlinearParameter:
         Whether it is scanned and refined on a logarithmic scale.
     of_length : bool
         Whether it is a way of the joint: of one that slides ``lower`` and ``upper`` are multiples of `Scene.radian`.
+    of_coefficient : bool
+        Whether it is the effect's first coefficient once more: how unsure that is follows from both as one.
     """
 
     name: str
@@ -43,6 +45,7 @@ class NonlinearParameter:
     upper: float
     logarithmic: bool = True
     of_length: bool = False
+    of_coefficient: bool = False
 
 
 @dataclass(frozen=True)

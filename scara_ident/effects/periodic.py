@@ -10,13 +10,14 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.effects.effect import DOUBT_STDS, SpectralLine
-from scara_ident.effects.friction import friction_slope
-from scara_ident.effects.links import rigid_slopes
+from scara_ident.effects.following import EstimateSlopes
+from scara_ident.effects.friction import friction_places, friction_slope
+from scara_ident.effects.links import behind, rigid_slopes
 from scara_ident.effects.parameters import Member, NonlinearParameter, Parameter, View
 from scara_ident.effects.signals import Scene, Signals
 from scara_ident.effects.sinusoid import Sinusoid, least_amplitude, sine_and_cosine, sines
 from scara_ident.effects.spectra import HIGHEST_FREQUENCY_SHARE
-from scara_ident.model.terms import Column
+from scara_ident.model.terms import Column, joint_rows
 
 # Orders that gears and motors have; others are found in the residual's spectrum.
 ORDERS = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 12.0)
@@ -130,17 +131,42 @@ class EncoderEccentricity(PerMotorTurn):
 
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
         """Return the change of torque per amplitude of sine and of cosine."""
-        j, order = member.place, member.nonlinear[0]
-        motion = signals.motion
+        by_q, by_v, by_a = _slopes(signals, member.place)
+        return [-(by_q * e + by_v * first + by_a * second) for e, first, second in self._errors(signals, member)]
+
+    def estimate_slopes(self, signals: Signals, member: Member, value: Array) -> EstimateSlopes:
+        """Return those of the bodies by their columns on either side of the recorded motion, and those of friction."""
+        j, scene, motion = member.place, signals.scene, signals.motion
+        term = scene.model.rigid_body
+        first = scene.model.place(term).start
+        error, speed_error, push_error = (
+            value[0] * sine + value[1] * cosine for sine, cosine in zip(*self._errors(signals, member), strict=True)
+        )
+        there, back = (
+            joint_rows(term, behind(motion, j, (side * error, side * speed_error, side * push_error)))
+            for side in (0.5, -0.5)
+        )
+        found = {
+            joint: (first + np.flatnonzero(acting), there[joint] - back[joint])
+            for joint, acting in enumerate(term.pattern)
+        }
+        speed, sign = np.abs(motion.v[j]), scene.robot.drive_sign[j]
+        powers = {power: place for power, place in friction_places(scene, j).items() if power}
+        friction = [-sign * power * speed ** (power - 1) * speed_error for power in powers]
+        places, rows = found[j]
+        found[j] = np.append(places, list(powers.values())).astype(np.intp), np.vstack([rows, *friction])
+        return found
+
+    def _errors(self, signals: Signals, member: Member) -> tuple[tuple[Array, Array, Array], ...]:
+        """Return what the encoder errs by, with its first two derivatives, (N,) each, per amplitude of sine and of cosine."""
+        j, order, motion = member.place, member.nonlinear[0], signals.motion
         per_turn = order * signals.scene.robot.reduction[j]
-        sine, cosine = sines(signals, j, order)
-        by_q, by_v, by_a = _slopes(signals, j)
-        speed, square = per_turn * motion.v[j], (per_turn * motion.v[j]) ** 2
-        push = per_turn * motion.a[j]
-        seen = _seen(signals, j, order)
-        of_sine: Array = by_q * sine + by_v * (speed * cosine) + by_a * (push * cosine - square * sine)
-        of_cosine: Array = by_q * cosine - by_v * (speed * sine) - by_a * (push * sine + square * cosine)
-        return [-(seen * of_sine), -(seen * of_cosine)]
+        sine, cosine = (_seen(signals, j, order) * part for part in sines(signals, j, order))
+        speed, push = per_turn * motion.v[j], per_turn * motion.a[j]
+        return (
+            (sine, speed * cosine, push * cosine - speed**2 * sine),
+            (cosine, -speed * sine, -push * sine - speed**2 * cosine),
+        )
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """Say so where an encoder would err by much of a turn."""

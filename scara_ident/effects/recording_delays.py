@@ -8,7 +8,8 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.effects.effect import DOUBT_STDS
-from scara_ident.effects.friction import friction_of
+from scara_ident.effects.following import EstimateSlopes
+from scara_ident.effects.friction import friction_of, friction_places
 from scara_ident.effects.measurement import SAMPLING, TimeDelay, lacking
 from scara_ident.effects.parameters import Member, Parameter, deviation
 from scara_ident.effects.signals import Scene, Signals
@@ -53,6 +54,16 @@ class DelayOfEachRecording(TimeDelay):
         own = lacking(signals, signals.predicted - np.array(coulomb)[:, None] * signals.sign)
         nothing = np.zeros_like(own)
         return [own if name == signals.motion.name else nothing for name in signals.scene.start]
+
+    def estimate_slopes(self, signals: Signals, member: Member, value: Array) -> EstimateSlopes:
+        """Return what each of the base model's columns but Coulomb friction lacks in its recording."""
+        scene = signals.scene
+        own = value[[name == signals.motion.name for name in scene.start]]
+        if not len(own):
+            return {}
+        coulomb = [friction_places(scene, joint).get(0, -1) for joint in range(scene.robot.n)]
+        found = super().estimate_slopes(signals, member, own)
+        return {joint: (places, rows * ~np.isin(places, coulomb)[:, None]) for joint, (places, rows) in found.items()}
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """Say so where no loop is that late."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.effects.effect import DOUBT_STDS, Effect
+from scara_ident.effects.following import EstimateSlopes
 from scara_ident.effects.links import first_moments, gravity_columns, gravity_torque, shared, sideways
 from scara_ident.effects.parameters import Member, NonlinearParameter, Parameter, View
 from scara_ident.effects.signals import Scene, Signals
@@ -123,6 +124,20 @@ def _parts(signals: Signals) -> Array:
     return shared(signals, "tilt", make)
 
 
+def _known_slopes(signals: Signals, axes: Sequence[int], tilt: Array) -> EstimateSlopes:
+    """Return the derivatives of the known parameters' torque under gravity against directions across it, by these parameters."""
+    scene, motion = signals.scene, signals.motion
+    term = scene.model.rigid_body
+    moments = _gravity(term).known
+    places = np.flatnonzero(np.any(moments != 0.0, axis=0))
+    result = np.zeros((scene.robot.n, len(places), motion.samples))
+    for axis, size in zip(axes, tilt.tolist(), strict=True):
+        for start in range(0, motion.samples, AT_ONCE):
+            part = slice(start, start + AT_ONCE)
+            result[:, :, part] += size * gravity_torque(scene.robot, axis, motion.q[:, part], moments[:, places].T)
+    return {joint: (scene.model.place(term).start + places, rows) for joint, rows in enumerate(result)}
+
+
 class _Tilt(Effect):
     """What both ways to tell a tilt share."""
 
@@ -165,6 +180,11 @@ class BaseTilt(_Tilt):
         """Return the torques of known parameters under sideways gravity and those of new ones."""
         parts = np.moveaxis(_parts(signals), 1, 0)
         return [*parts[list(_gravity(signals.scene.model.rigid_body).known_axes)], *parts[4:]]
+
+    def estimate_slopes(self, signals: Signals, member: Member, value: Array) -> EstimateSlopes:
+        """Return those by the known first moments, which turn with gravity."""
+        axes = _gravity(signals.scene.model.rigid_body).known_axes
+        return _known_slopes(signals, axes, value[: len(axes)])
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """The base is nearly level, and parameters that are known show what new ones show."""
@@ -218,6 +238,10 @@ class NominalBaseTilt(_Tilt):
         factor = member.nonlinear[0] if gravity.known_axes else 1.0
         parts = np.moveaxis(_parts(signals), 1, 0)
         return [parts[axis] + factor * parts[2 + axis] for axis in self._axes(signals.scene)]
+
+    def estimate_slopes(self, signals: Signals, member: Member, value: Array) -> EstimateSlopes:
+        """Return those by the known first moments, which turn with gravity."""
+        return _known_slopes(signals, self._axes(signals.scene), value)
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """The base is nearly level."""

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from scara_ident.diagnosis.candidates import Candidate
+from scara_ident.diagnosis.candidates import Candidate, CandidateColumns
+from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.effect_parameters import (
     Coefficients,
     _told,
@@ -17,23 +19,37 @@ from scara_ident.diagnosis.effect_parameters import (
     physical_parameters,
     told_size,
 )
+from scara_ident.diagnosis.nonlinear_fit import tune
+from scara_ident.diagnosis.search import scene_of as scene_at
 from scara_ident.diagnosis.selection_step import SelectionStep
 from scara_ident.effects import Member, Parameter
 from scara_ident.effects.coupling import DriveCoupling
 from scara_ident.effects.friction import Stribeck
 from scara_ident.effects.gear import TransmissionLoss
 from scara_ident.effects.position import Spring
-from scara_ident.estimation.observations import Observations
-from scara_ident.robot.robot import load_robot
-from tests.arms import noisy
+from scara_ident.effects.tilt import BaseTilt
+from scara_ident.estimation import wls
+from scara_ident.estimation.observations import Observations, observe
+from scara_ident.model.model import build_model
+from scara_ident.motion.prepared import PreparedData, prepare
+from scara_ident.recording.recording import Recording
+from scara_ident.robot.robot import Robot, load_robot
+from tests.arms import Link, noisy, recorded_torque, recording, sines, write_urdf
 from tests.diagnosis.made import NOISE, complete, exact_runs, observed, step_beside, with_torque
 from tests.effects.scenes import scene_of
 from tests.effects.test_position import without_offset
+from tests.effects.test_tilt import leaning
 
 Array = NDArray[np.float64]
 
 AMPLITUDE, VELOCITY, STIFFNESS, REST = 0.06, 0.5, 0.05, 0.4
 WEIGHTS = 1.0 / np.array(NOISE)
+
+
+class Leak(DriveCoupling):
+    """A share of the other joint's torque as it was predicted once."""
+
+    follows_estimate = False
 
 
 def stribeck_runs():
@@ -135,7 +151,7 @@ def test_the_deviation_of_a_coefficient_holds_what_the_noise_of_positions_does()
     rng = np.random.default_rng(5)
     shared = [replace(run, effort=run.effort + np.outer([0.1, 0.0], run.effort[1])) for run in exact_runs()]
     runs = [replace(run, position=run.position + 3e-4 * rng.standard_normal(run.position.shape)) for run in shared]
-    step = step_beside(runs, [Candidate(DriveCoupling(), Member(0, (), 1))], WEIGHTS)
+    step = step_beside(runs, [Candidate(Leak(), Member(0, (), 1))], WEIGHTS)
 
     def share(at: SelectionStep) -> float:
         """Plain least squares of all rows at once."""
@@ -163,3 +179,54 @@ def test_coefficients_are_at_least_what_their_uncertainty_leaves():
 def test_a_size_is_told_where_it_differs_from_none_whatever_the_other_parameters(std: float, told: bool):
     parameters = {"amplitude": Parameter(AMPLITUDE, std, "N m"), "velocity": Parameter(VELOCITY, 0.01, "rad/s")}
     assert told_size(Stribeck(), parameters, 2.5) is told
+
+
+def fits(robot: Robot, runs: Sequence[Recording], chosen: Candidate, noise: Array, draws: int) -> dict[str, Array]:
+    """Each parameter with its standard deviation, (draws, 2), as it is fitted to the same motions with noise anew."""
+    ready, model = prepare(runs, (10.0,) * robot.n), build_model(robot)
+    found: dict[str, list[tuple[float, float]]] = {}
+    for k in range(draws):
+        rng = np.random.default_rng([3, k])
+        parts = [own.with_effort_of(noisy(run, rng, noise)) for own, run in zip(ready.recordings, runs, strict=True)]
+        seen = observe(model, PreparedData(tuple(parts), ready.bands))
+        scene = scene_at(model, wls(seen).value, seen)
+        step = SelectionStep(scene, CandidateColumns(seen), (chosen,), 1.0 / noise, 10, CRITERIA)
+        (told,) = physical_parameters(tune(step)).effects
+        for name, parameter in told.items():
+            found.setdefault(name, []).append((parameter.value, parameter.std))
+    return {name: np.array(each) for name, each in found.items()}
+
+
+def test_a_tilt_is_as_unsure_as_the_masses_that_it_pulls_at(tmp_path: Path):
+    """Of a slide that turns, gravity from the side tells mass times tilt: the tilt seemed known however little the mass was."""
+    links = (
+        Link(mass=12.0, inertia=(0.2, 0.2, 0.4)),
+        Link("prismatic", (1.0, 0.0, 0.0), mass=5.0, com=(0.2, 0.0, 0.0), inertia=(0.02, 0.1, 0.1)),
+    )
+    robot = load_robot(write_urdf(tmp_path / "arm.urdf", links))
+    tilts, time = (0.1, -0.08), np.arange(3000) / 125.0
+    runs = []
+    for k in range(3):
+        q, v, a = sines(np.random.default_rng(k), time, 2, size=0.8, lowest=0.04)
+        torque = recorded_torque(leaning(robot, tilts), q, v, a, [(0.2, 0.1, 0.0, 0.0, 0.0)] * 2)
+        runs.append(recording(robot, f"t{k}_1", time, q, torque))
+    found = fits(robot, runs, Candidate(BaseTilt(), Member(None)), np.array([0.2, 0.2]), 24)
+    for axis, tilt in zip("xy", tilts, strict=True):
+        value, std = found[f"tilt_{axis}"].T
+        assert np.median(std) == pytest.approx(np.std(value), rel=0.4)
+        assert np.mean(np.abs(value - tilt) < 2.0 * std) > 0.8
+
+
+def test_what_a_gear_loses_is_told_where_one_parameter_is_its_load(tmp_path: Path):
+    """Of a lift the gain that goes with the loss is one with its mass: free, it left open how large the loss is."""
+    robot = load_robot(write_urdf(tmp_path / "lift.urdf", (Link("prismatic", mass=20.0),)))
+    share, time = 0.15, np.arange(3000) / 250.0
+    runs = []
+    for k in range(3):
+        q, v, a = sines(np.random.default_rng(k), time, 1, size=0.5)
+        load = recorded_torque(robot, q, v, a, [(0.0,) * 5])
+        lost = (np.sqrt(1.0 + share**2) - 1.0) * load + share * np.abs(load) * np.sign(v)
+        runs.append(recording(robot, f"t{k}_1", time, q, load + lost + 2.0 * np.sign(v) + v))
+    found = fits(robot, runs, Candidate(TransmissionLoss(), Member(0, (share,))), np.array([2.0]), 24)
+    value, std = found["loss_coefficient"].T
+    assert np.median(std) == pytest.approx(np.std(value), rel=0.4)

@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 
 from scara_ident.diagnosis.candidates import Candidate
-from scara_ident.diagnosis.linearised import Linearised
+from scara_ident.diagnosis.linearised import Linearised, with_estimate_slopes
 from scara_ident.effects import Member
 from scara_ident.effects.friction import Stribeck
 from scara_ident.effects.gear import TransmissionLoss
+from scara_ident.effects.measurement import TorqueSensorNonlinearity
+from scara_ident.estimation.information import merge
 from tests.diagnosis.made import step_beside
 from tests.diagnosis.test_nonlinear_fit import WEIGHTS, linear, loss_runs
 
@@ -47,6 +49,59 @@ def test_the_derivatives_are_those_of_the_predicted_torque() -> None:
         # The load's absolute value has kinks, at which steps of different length differ, and an armature's is long.
         bound = 5e-2 if k == 2 else 2e-3
         assert np.linalg.norm(derivatives[:, k] - numeric) < bound * np.linalg.norm(numeric)
+
+
+def test_where_columns_follow_the_base_model_its_derivatives_are_those_of_the_predicted_torque() -> None:
+    chosen = (
+        Candidate(Stribeck(), Member(1, (0.2,))),
+        Candidate(TransmissionLoss(), Member(0, (0.3,))),
+        Candidate(TorqueSensorNonlinearity(), Member(1)),
+    )
+    step = step_beside(loss_runs(0.3, 1.0)[:1], chosen, WEIGHTS)
+    scene, plain = step.scene, linear(step)
+    state = with_estimate_slopes(step, plain)
+    start = len(scene.value)
+    coefficients = plain.value[start:]
+
+    def predicted(value: np.ndarray) -> np.ndarray:
+        return dense(linear(step, scene=replace(scene, value=value)))[:, : plain.linear] @ np.append(
+            value, coefficients
+        )
+
+    derivatives = dense(state)
+    for k in range(start):
+        # Loads change their sign at other samples where a parameter moves: hardly, by so little.
+        reach = 1e-5 * max(abs(scene.value[k]), 0.1)
+        up, down = (scene.value + sign * reach * (np.arange(start) == k) for sign in (1.0, -1.0))
+        numeric = (predicted(up) - predicted(down)) / (2.0 * reach)
+        assert np.linalg.norm(derivatives[:, k] - numeric) < 2e-3 * np.linalg.norm(numeric)
+    # Some of it is new, all else as it was, and what is left at the present estimate too.
+    bodies = scene.model.place(scene.model.rigid_body)
+    before, after = (np.linalg.norm(dense(each)[:, bodies], axis=0) for each in (plain, state))
+    assert np.max(np.abs(after / before - 1.0)) > 0.05
+    assert np.array_equal(derivatives[:, start:], dense(plain)[:, start:])
+    at = np.append(scene.value, coefficients)
+    for here, there in zip(state.joints, plain.joints, strict=True):
+        before, after = (rows.left(np.append(at, np.zeros(len(state.unknowns)))) for rows in (there, here))
+        assert after == pytest.approx(before, abs=1e-9 * np.max(np.abs(here.table[-1])))
+    # Where nothing follows nothing is made.
+    (friction, *_) = chosen
+    alone = replace(step, chosen=(friction,))
+    as_it_was = linear(alone)
+    assert with_estimate_slopes(alone, as_it_was) is as_it_was
+
+
+def test_a_nonlinear_parameter_that_is_the_coefficient_changes_with_it() -> None:
+    chosen = (Candidate(Stribeck(), Member(1, (0.2,))), Candidate(TransmissionLoss(), Member(0, (0.4,))))
+    step = step_beside(loss_runs(0.3, 1.0)[:1], chosen, WEIGHTS)
+    plain = linear(step)
+    state = with_estimate_slopes(step, plain)
+    column, share = state.places[1].start, state.linear + 1
+    assert state.value[column] == pytest.approx(plain.value[column], rel=1e-6)
+    inverse = merge([state.information, state.prior]).inverse()
+    variance, of_share = inverse[column, column], inverse[share, share]
+    assert of_share == pytest.approx(variance, rel=1e-4)
+    assert inverse[column, share] == pytest.approx(variance, rel=1e-4)
 
 
 def test_the_solution_is_that_of_all_weighted_rows_with_those_of_the_priors() -> None:

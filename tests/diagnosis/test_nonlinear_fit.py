@@ -14,7 +14,7 @@ from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.effect_parameters import physical_parameters
 from scara_ident.diagnosis.linearised import Linearised, freed_model, linearise
-from scara_ident.diagnosis.nonlinear_fit import _settled, tune
+from scara_ident.diagnosis.nonlinear_fit import _is_short, tune
 from scara_ident.diagnosis.selection_step import SelectionStep
 from scara_ident.diagnosis.unknowns import Unknown
 from scara_ident.effects import Member, effects_named
@@ -22,6 +22,7 @@ from scara_ident.effects.elasticity import Backlash, JointElasticity
 from scara_ident.effects.friction import Stribeck
 from scara_ident.effects.gear import TransmissionLoss
 from scara_ident.effects.links import tool_of, usual_link_inertia
+from scara_ident.effects.measurement import TorqueSensorNonlinearity
 from scara_ident.effects.payload import PayloadOfRecordings
 from scara_ident.effects.position import Spring
 from scara_ident.model.model import build_model
@@ -342,7 +343,7 @@ def test_a_coarse_fit_goes_on_where_a_step_was_cut_short_that_the_model_promises
     module = sys.modules[tune.__module__]
     step = step_beside(exact_runs(), [Candidate(Spring(), Member(1))])
     monkeypatch.setattr(module, "linearise", lambda step: State())
-    monkeypatch.setattr(module, "_settled", lambda *_: False)
+    monkeypatch.setattr(module, "_is_short", lambda *_: False)
     monkeypatch.setattr(module, "_settling", lambda step: np.zeros(0, dtype=np.intp))
     monkeypatch.setattr(module, "_share", lambda *_: 0.5)
     monkeypatch.setattr(module, "_moved", lambda step, *_: step)
@@ -368,4 +369,12 @@ def test_a_way_is_short_by_its_parameters_or_by_what_it_promises(
         rows=100,
         gain=lambda _: promised / 100.0,
     )
-    assert _settled(state, np.array([load, step]), np.ones(2), np.arange(1)) is settled
+    assert _is_short(state, np.array([load, step]), np.ones(2), np.arange(1)) is settled
+
+
+def test_a_strong_effect_whose_columns_follow_the_estimate_settles() -> None:
+    """By columns made anew of each estimate it had come to 9 when the rounds were over."""
+    cubic = 12.0
+    runs = [replace(run, effort=run.effort + np.outer([0.0, cubic], run.effort[1] ** 3)) for run in exact_runs()]
+    step = tuned(runs, Candidate(TorqueSensorNonlinearity(), Member(1)))
+    assert linear(step).value[-1] == pytest.approx(cubic, rel=0.05)
