@@ -259,7 +259,8 @@ class _View:
         """
         left = self.left(item, {item.label})
         singular = np.linalg.svd(left @ self.inquiry.just_seen[item.label], compute_uv=False)
-        return float(1.0 / np.sqrt(np.mean(1.0 / singular**2))) if np.all(singular > 0.0) else 0.0
+        # Where no coefficient would have been seen no motion tells it either.
+        return float(1.0 / np.sqrt(np.mean(1.0 / singular**2))) if len(singular) and np.all(singular > 0.0) else 0.0
 
     def _parameter(self, question: Question) -> float:
         model = self.inquiry.scene.model

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from scara_ident.diagnosis.answerability import inquire, inquiry_of
+from scara_ident.diagnosis.answerability import _View, inquire, inquiry_of
 from scara_ident.diagnosis.candidate_tests import examine
 from scara_ident.diagnosis.questions import Question, questions
 from scara_ident.diagnosis.selection_step import fitted_model
@@ -132,3 +133,10 @@ def test_a_file_and_the_recordings_give_the_same_inquiry():
         inquiry_of({**content, "robot": "ur5"}, load_robot())
     with pytest.raises(ScaraIdentError, match="no questions in it"):
         inquiry_of({"robot": "scara03"}, load_robot())
+
+
+def test_a_suspect_of_which_nothing_would_have_been_seen_is_not_told(monkeypatch: pytest.MonkeyPatch):
+    """Of a run in which one joint of six moves: a mean over no directions, which is no number."""
+    monkeypatch.setattr(_View, "left", lambda *_: np.ones((4, 2)))
+    view = _View(SimpleNamespace(just_seen={"it": np.zeros((2, 0))}), np.zeros((0, 0)), np.zeros((0, 0)))
+    assert view._from_none(SimpleNamespace(label="it")) == 0.0

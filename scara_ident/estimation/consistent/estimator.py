@@ -257,7 +257,8 @@ def _beyond_constraints(covariance: Array, plain: Array, apart: float) -> Array:
     share = float(np.clip(1.0 + apart - beyond * tail, 0.0, 1.0))
     known = np.isfinite(np.diag(plain))
     found = covariance.copy()
-    found[np.ix_(known, known)] += share * (plain - covariance)[np.ix_(known, known)]
+    own = np.ix_(known, known)
+    found[own] += share * (plain[own] - covariance[own])
     return found
 
 

@@ -86,7 +86,7 @@ def parse_effect(text: str) -> Effect:
     Examples
     --------
     >>> parse_effect("spring:joint2:stiffness=0.05")
-    Spring(joint='joint2', stiffness=0.05, rest_position=0.3)
+    Spring(joint='joint2', stiffness=0.05, rest_position=nan)
     >>> parse_effect("push:force=15,from=4.2,direction=0/0/-1").direction
     (0.0, 0.0, -1.0)
     """

@@ -282,3 +282,10 @@ def test_the_solvers_last_digits_are_no_direction_to_move_in():
     exact = allowed @ np.linalg.inv(allowed.T @ rows.T @ rows @ allowed) @ allowed.T
     along = _half_along(information, rounding, np.ones(5))
     np.testing.assert_allclose(along @ along.T, exact, atol=1e-7)
+
+
+def test_what_both_leave_open_stays_open():
+    """Of recordings in which five joints rest, what no row tells has no finite variance with or without constraints."""
+    plain, along = np.diag([2.0, np.inf]), np.diag([1.0, np.inf])
+    found = _beyond_constraints(along, plain, 0.0)
+    assert found[0, 0] == pytest.approx(2.0) and found[1, 1] == np.inf
