@@ -47,10 +47,11 @@ def lowest(step: SelectionStep) -> SelectionStep:
 
     Each of them in turn begins as `Effect.elsewhere` has it, the others where the first fit ended.
     """
-    best = _fitted(step)
-    if len(_together(best.step)) < 2:
-        return best.step
-    rivals = _rivals(replace(best, step=replace(best.step, minima=())))
+    first = tune(step)
+    if len(_together(first)) < 2:
+        return first
+    best = _Fit(replace(first, minima=()), linearise(first).error)
+    rivals = _rivals(best)
     if rivals and rivals[0].near(best):
         other = _fitted(rivals[0].step)
         if other.error < (1.0 - RISE) * best.error:
