@@ -64,6 +64,8 @@ class Effect(ABC):
     on_links : bool
         Whether its torque acts on links, as that of a body or a spring does, and not on motors or in what is measured: the
         gears then transmit it, and effects that follow `Signals.load` know it.
+    of_position : bool
+        Whether its torque on links follows from the positions alone, so that how it changes with speeds need not be asked.
     of_load : bool
         Whether the columns are a function of the load that a gear transmits: with an effect that acts on links they are others,
         and are made again to be tried beside it.
@@ -103,6 +105,7 @@ class Effect(ABC):
     at_rest: ClassVar[bool] = False
     follows_estimate: ClassVar[bool] = False
     on_links: ClassVar[bool] = False
+    of_position: ClassVar[bool] = False
     of_load: ClassVar[bool] = False
     fitted_first: ClassVar[bool] = False
     together: ClassVar[bool] = False

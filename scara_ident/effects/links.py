@@ -222,17 +222,21 @@ def link_slopes(signals: Signals, joint: int) -> tuple[Array, Array, Array]:
         return rigid
 
     def made() -> tuple[Array, Array, Array]:
-        found, motion = [], signals.motion
-        state = (motion.q, motion.v, motion.a)
-        for k, step in enumerate((POSITION_STEP, SPEED_STEP * max(float(np.max(np.abs(motion.v))), 1.0))):
+        motion, state = signals.motion, (signals.motion.q, signals.motion.v, signals.motion.a)
+
+        def differentiated(k: int, step: float) -> Array:
             up, down = [part.copy() for part in state], [part.copy() for part in state]
             up[k][joint] += step
             down[k][joint] -= step
-            found.append((on_links_at(signals, *up) - on_links_at(signals, *down)) / (2.0 * step))
+            return (on_links_at(signals, *up) - on_links_at(signals, *down)) / (2.0 * step)
+
+        by_q = rigid[0] + differentiated(0, POSITION_STEP)
+        if all(item.effect.of_position for item in signals.scene.link_torques):
+            return by_q, rigid[1], rigid[2]
+        by_v = rigid[1] + differentiated(1, SPEED_STEP * max(float(np.max(np.abs(motion.v))), 1.0))
         pushed = motion.a.copy()
         pushed[joint] += 1.0
-        by_a = on_links_at(signals, motion.q, motion.v, pushed) - signals.on_links
-        return rigid[0] + found[0], rigid[1] + found[1], rigid[2] + by_a
+        return by_q, by_v, rigid[2] + on_links_at(signals, motion.q, motion.v, pushed) - signals.on_links
 
     return shared(signals, ("on links", joint), made)
 

@@ -32,6 +32,7 @@ class Spring(Effect):
     )  # fmt: skip
     at_rest = True
     on_links = True
+    of_position = True
     of_state = True
     watched = True
     view = View("position")

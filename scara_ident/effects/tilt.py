@@ -145,6 +145,7 @@ class _Tilt(Effect):
     summary = "a base that is not level"
     follows_estimate = True
     on_links = True
+    of_position = True
     of_state = True
     watched = True
     view = View("position")

@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 from numpy.testing import assert_array_equal
 
-from scara_ident.effects import Signals
+from scara_ident.effects import CATALOGUE, Effect, Member, Signals
 from scara_ident.effects.links import (
     first_moments,
     gravity_columns,
@@ -28,6 +28,8 @@ from scara_ident.effects.links import (
     tool_of,
     usual_link_inertia,
 )
+from scara_ident.effects.signals import LinkTorque
+from scara_ident.effects.tilt import NominalBaseTilt
 from scara_ident.motion.motion import Motion
 from scara_ident.robot.robot import Robot, load_robot
 from tests.arms import example_urdf, rnea
@@ -168,3 +170,36 @@ def test_what_acts_on_links_lags_with_them_as_if_the_bodies_had_it(name: str):
     state = item.q + 0.1, item.v, item.a
     expected = rigid_torque(merged.scene, item, *state) - rigid_torque(carried.scene, item, *state)
     assert on_links_at(carried, *state) == pytest.approx(expected, abs=1e-9)
+
+
+@pytest.mark.parametrize("effect", [x for x in CATALOGUE if x.of_position], ids=lambda item: type(item).__name__)
+def test_a_torque_that_is_of_the_position_knows_no_speed(effect: Effect):
+    assert effect.on_links
+    robot = load_robot(example_urdf("ur5_robot.urdf"))
+    scene, item, other = scene_of(robot), moving(robot, 0.1), moving(robot, 0.1, seed=3)
+    members = effect.members(scene)
+    assert members
+    for member in members:
+        value = np.ones(len(effect.columns(scene, member)))
+        moved = replace(item, v=other.v, a=other.a)
+        here, there = (effect.torque_on_links(Signals(scene, each), member, value) for each in (item, moved))
+        assert_array_equal(here, there)
+
+
+def test_what_a_leaning_base_does_to_links_changes_with_their_positions_alone():
+    robot = load_robot(example_urdf("ur5_robot.urdf"))
+    scene, item, joint = scene_of(robot), moving(robot, 0.2), 2
+    tilt = LinkTorque(NominalBaseTilt(), Member(None, (1.0,)), (0.02, -0.03))
+    leaning = replace(scene, link_torques=(tilt,))
+    rigid, found = (link_slopes(Signals(each, item), joint) for each in (scene, leaning))
+    ends = []
+    for step in (1e-4, -1e-4):
+        q = item.q.copy()
+        q[joint] += step
+        columns = np.array([gravity_columns(robot, axis, q) for axis in range(2)])
+        moments = robot.standard_parameters()[first_moments(robot)]
+        ends.append(np.einsum("a,ajkn,k->jn", [0.02, -0.03], columns, moments))
+    expected = (ends[0] - ends[1]) / 2e-4
+    assert found[0] - rigid[0] == pytest.approx(expected, abs=1e-4 * np.abs(expected).max())
+    assert_array_equal(found[1], rigid[1])
+    assert_array_equal(found[2], rigid[2])
