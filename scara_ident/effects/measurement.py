@@ -12,6 +12,7 @@ import numpy as np
 from scara_ident.arrays import Array
 from scara_ident.effects.effect import DOUBT_STDS, Effect
 from scara_ident.effects.following import EstimateSlopes, predicted_slopes
+from scara_ident.effects.links import shared
 from scara_ident.effects.parameters import Coefficient, Member, Parameter, View, deviation
 from scara_ident.effects.scale_groups import scale_groups
 from scara_ident.effects.signals import Scene, Signals
@@ -73,11 +74,24 @@ class TorqueSensorNonlinearity(Effect):
         return {member.place: (places, 3.0 * value[0] * signals.predicted[member.place] ** 2 * rows)}
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
-        """Say so where what is recorded does not grow with the torque, up to the torque limit."""
-        limit = float(scene.robot.torque_limit[member.place])
-        if np.isfinite(limit) and value[0] + DOUBT_STDS * std[0] < -1.0 / limit**2:
-            return "the recorded torque would change sign below the torque limit"
+        """Say so where what is recorded does not grow with the torque, up to the largest that the recordings hold."""
+        largest = _largest_torque(scene, member.place)
+        if np.isfinite(largest) and 1.0 + 3.0 * (value[0] + DOUBT_STDS * std[0]) * largest**2 < 0.0:
+            return f"what is recorded would not grow with the torque up to {largest:.2g} {scene.robot.torque_unit(member.place)}"
         return None
+
+
+def _largest_torque(scene: Scene, joint: int) -> float:
+    """Return the largest torque that the base model says of recordings, recorded side; without any the limit.
+
+    A channel that bends within the range of the data need not do so by the same law up to the limit, which few recordings reach.
+    """
+
+    def found() -> float:
+        own = scene.value[scene.model.active[joint]]
+        return max(float(np.max(np.abs(own @ rows[joint]), initial=0.0)) for rows in scene.columns.values())
+
+    return shared(scene, ("largest torque", joint), found) if scene.columns else float(scene.robot.torque_limit[joint])
 
 
 class TorqueGainMismatch(Effect):

@@ -125,9 +125,22 @@ def test_impossible_sizes_are_refused():
     # A factor of two and a bit, one way and the other: which joint is the reference makes no difference.
     for ratio, said in ((0.2, True), (0.45, True), (0.55, False), (1.6, False), (1.9, False), (2.2, True)):
         assert bool(TorqueGainMismatch().inadmissible(scene, Member(1), np.array([ratio - 1.0]), std)) == said
-    # At 2 N m, the limit, nothing of the torque would be left.
-    assert TorqueSensorNonlinearity().inadmissible(scene, Member(0), np.array([-0.3]), std)
-    assert TorqueSensorNonlinearity().inadmissible(scene, Member(0), np.array([-0.1]), std) is None
+    # At 2 N m, the limit, what is recorded would fall with the torque.
+    assert TorqueSensorNonlinearity().inadmissible(scene, Member(0), np.array([-0.1]), std)
+    assert TorqueSensorNonlinearity().inadmissible(scene, Member(0), np.array([-0.08]), std) is None
+
+
+def test_a_channel_may_bend_by_another_law_beyond_what_was_recorded():
+    robot = load_robot()
+    robot = replace(robot, effort_limit=5.0 * robot.effort_limit)
+    scene, motion = scene_of(robot), moving(robot, 1.0)
+    held = replace(scene, columns={motion: scene.model.joint_columns(motion)})
+    largest = float(np.max(np.abs(Signals(scene, motion).predicted[1])))
+    assert 3.0 * largest < robot.torque_limit[1]
+    effect, std = TorqueSensorNonlinearity(), np.array([1e-6])
+    assert effect.inadmissible(held, Member(1), np.array([-0.3 / largest**2]), std) is None
+    assert f"up to {largest:.2g} N m" in effect.inadmissible(held, Member(1), np.array([-0.4 / largest**2]), std)
+    assert effect.inadmissible(scene, Member(1), np.array([-0.3 / largest**2]), std)
 
 
 def tones(time: np.ndarray) -> np.ndarray:
