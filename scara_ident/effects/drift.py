@@ -45,8 +45,7 @@ class WarmUp(Effect):
             LARGEST_WARM_UP_SHARE, f"friction would fall to less than a {1.0 + LARGEST_WARM_UP_SHARE:.0f}th in the run",
         ),
     )  # fmt: skip
-    # A run that ends before friction has fallen tells its rate.
-    nonlinear = (NonlinearParameter("time_constant", "s", 0.05, 1e5, told_as=-1.0),)
+    nonlinear = (NonlinearParameter("time_constant", "s", 0.05, 1e5),)
     follows_estimate = True
     view = View("time", along=True)
     experiment = "run the same trajectory cold and again after half an hour of motion, with the time of day recorded"

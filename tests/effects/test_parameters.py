@@ -39,7 +39,7 @@ def test_an_interval_is_told_where_value_and_deviation_say_too_little():
     [
         (NonlinearParameter("distance", "rad", 1e-5, 0.3), 0.0),
         (NonlinearParameter("place", "rad", -1.0, 4.0, logarithmic=False), 1.0),
-        (NonlinearParameter("time_constant", "s", 0.05, 1e5, told_as=-1.0), -1.0),
+        (NonlinearParameter("frequency", "Hz", 0.05, 200.0, told_as=-2.0), -2.0),
     ],
 )
 def test_a_nonlinear_parameter_is_told_as_it_is_refined_unless_it_says_otherwise(
