@@ -17,6 +17,7 @@ import numpy as np
 from virtual_motions import random_motion
 
 from scara_ident import diagnose, parse_effect, simulate, virtual_arm
+from scara_ident.effects import Parameter
 from scara_ident.robot.robot import load_robot
 
 STIFFNESS = (700.0, 20000.0)
@@ -39,19 +40,22 @@ def main() -> None:
         row = found_of(true, seed)
         rows.append(row)
         said = ", ".join(
-            f"{joint} {k:.0f} ± {std:.0f} ({true.get(joint, np.nan):.0f})" for joint, (k, std) in row["found"].items()
+            f"{joint} {k:.0f} ± {std:.0f}, {low:.0f} to {high:.0f} ({true.get(joint, np.nan):.0f})"
+            for joint, (k, std, low, high) in row["found"].items()
         )
         print(f"{seed}: {true} -> {row['verdict']}: {said or 'none'}; {row['seconds']:.1f} s", flush=True)
     named = [row for row in rows if row["found"].keys() == row["true"].keys()]
-    off = [abs(k - row["true"][joint]) / std for row in named for joint, (k, std) in row["found"].items()]
+    each = [(row["true"][joint], *told) for row in named for joint, told in row["found"].items()]
+    off = [abs(k - true) / std for true, k, std, _, _ in each]
+    held = sum(low < true < high for true, _, _, low, high in each)
     print(f"{len(named)} of {len(rows)} sets with the joints that are elastic and no other; of their {len(off)} stiffnesses "
-          f"{sum(item < 2.0 for item in off)} within two standard deviations, largest {max(off, default=0.0):.1f}")  # fmt: skip
+          f"{sum(item < 2.0 for item in off)} within two standard deviations, largest {max(off, default=0.0):.1f}; {held} in their intervals")  # fmt: skip
     if given.output:
         given.output.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
 
 
 def found_of(true: dict[str, float], seed: int) -> dict[str, object]:
-    """Record a set, diagnose it, and return the elastic joints found with their standard deviations."""
+    """Record a set, diagnose it, and return the elastic joints found with their standard deviations and intervals."""
     arm = virtual_arm()
     effects = [parse_effect(f"joint_elasticity:{joint}:stiffness={k}") for joint, k in true.items()]
     runs = []
@@ -61,13 +65,19 @@ def found_of(true: dict[str, float], seed: int) -> dict[str, object]:
     began = time.process_time()
     result = diagnose(load_robot(), runs[:-1], validation=runs[-1:])
     found = {
-        str(item.joint): (item.parameters["stiffness"].value, item.parameters["stiffness"].std)
+        str(item.joint): told_of(item.parameters["stiffness"])
         for item in result.effects
         if item.effect == "joint_elasticity"
     }
     others = [item.label for item in result.effects if item.effect != "joint_elasticity"]
     took = time.process_time() - began
     return {"seed": seed, "true": true, "verdict": result.verdict, "found": found, "others": others, "seconds": took}
+
+
+def told_of(item: Parameter) -> tuple[float, float, float, float]:
+    """Return a parameter with its standard deviation and the ends of its interval of 95 %."""
+    low, high = item.interval or (item.value - 2.0 * item.std, item.value + 2.0 * item.std)
+    return item.value, item.std, low, high
 
 
 if __name__ == "__main__":

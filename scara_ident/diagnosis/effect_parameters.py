@@ -122,7 +122,9 @@ def physical_parameters(step: SelectionStep, *, of_runs: bool = True, of_noise: 
                 # Any value of a range that no row tells apart is as likely.
                 variance += candidate.effect.gap(step.scene, candidate.member)[unknown.place] ** 2 / 12.0
                 unit = parameter.unit.format(**candidate.effect.words(step.scene, candidate.member))
-                parameters[parameter.name] = Parameter(unknown.value, float(np.sqrt(max(variance, 0.0))), unit)
+                parameters[parameter.name] = parameter.parameter(
+                    unknown.value, float(np.sqrt(max(variance, 0.0))), unit
+                )
         found.append(parameters)
     return PhysicalParameters(tuple(found), tuple(coefficients), _rotors(step, state, covariance))
 

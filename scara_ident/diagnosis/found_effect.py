@@ -145,7 +145,7 @@ def found_effects(
                 candidate.effect.name,
                 candidate.joint(scene),
                 candidate.effect.description(scene, candidate.member) + otherwise,
-                values,
+                candidate.effect.told(values),
                 confounded,
                 min(1.0, decision.examination.p_value * found.tried),
                 decision.gain,

@@ -246,6 +246,13 @@ class Effect(ABC):
             for k, column in enumerate(self.columns(scene, member))
         }
 
+    def told(self, parameters: Mapping[str, Parameter]) -> Mapping[str, Parameter]:
+        """Return the physical parameters, nonlinear ones among them, each with the power of it that the data tell.
+
+        For a family in which that follows from how sure others are; else `parameters` and `NonlinearParameter` say it.
+        """
+        return parameters
+
     def told_beside(self, scene: Scene, member: Member) -> Member | None:
         """Return the member of this family by whose coefficients too, where it is found, the physical parameters are."""
         return None

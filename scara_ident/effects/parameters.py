@@ -3,20 +3,39 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from scara_ident.arrays import Array
+from scara_ident.effects.told_as import interval
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """A physical parameter of an effect: its value, standard deviation and unit."""
+    """A physical parameter of an effect: its value, standard deviation and unit.
+
+    Attributes
+    ----------
+    told_as : float
+        The power of it that the data tell: 1 itself, -1 its reciprocal, 0 its logarithm; see `scara_ident.effects.told_as`.
+    """
 
     value: float
     std: float
     unit: str
+    told_as: float = 1.0
+
+    @property
+    def interval(self) -> tuple[float, float] | None:
+        """Where it is with 95 %, an open end infinite; None where that is the value give or take two standard deviations."""
+        return interval(self.value, self.std, self.told_as)
+
+    def entry(self) -> dict[str, Any]:
+        """Return it as JSON has it, an open end None."""
+        found = {"value": self.value, "std": self.std, "unit": self.unit}
+        ends = self.interval
+        return found if ends is None else {**found, "interval": [end if np.isfinite(end) else None for end in ends]}
 
 
 @dataclass(frozen=True)
@@ -37,6 +56,8 @@ class NonlinearParameter:
         Whether it is a way of the joint: of one that slides ``lower`` and ``upper`` are multiples of `Scene.radian`.
     of_coefficient : bool
         Whether it is the effect's first coefficient once more: how unsure that is follows from both as one.
+    told_as : float or None
+        The power of it that the data tell, see `Parameter`; None for what it is refined in, its logarithm or itself.
     """
 
     name: str
@@ -46,6 +67,12 @@ class NonlinearParameter:
     logarithmic: bool = True
     of_length: bool = False
     of_coefficient: bool = False
+    told_as: float | None = None
+
+    def parameter(self, value: float, std: float, unit: str) -> Parameter:
+        """Return it as a physical parameter."""
+        told_as = (0.0 if self.logarithmic else 1.0) if self.told_as is None else self.told_as
+        return Parameter(value, std, unit, told_as)
 
 
 @dataclass(frozen=True)

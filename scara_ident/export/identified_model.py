@@ -178,7 +178,7 @@ def identified_model(found: Identification | Diagnosis) -> IdentifiedModel:
             {
                 "effect": item.effect,
                 "joint": item.joint,
-                "parameters": {name: dict(vars(parameter)) for name, parameter in item.parameters.items()},
+                "parameters": {name: parameter.entry() for name, parameter in item.parameters.items()},
                 "held_out": None if item.held_out is None else item.held_out.entry(),
             }
             for item in found.effects

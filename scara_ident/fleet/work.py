@@ -59,9 +59,7 @@ def diagnosis_of(robot: bytes, model: str, files: Sequence[RecordingFile]) -> di
             "effect": item.effect,
             "joint": item.joint,
             "description": item.description,
-            "parameters": {
-                name: {"value": one.value, "std": one.std, "unit": one.unit} for name, one in item.parameters.items()
-            },
+            "parameters": {name: one.entry() for name, one in item.parameters.items()},
         }
         for item in found.effects
     ]

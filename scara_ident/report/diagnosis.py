@@ -56,10 +56,10 @@ def diagnosis_dict(diagnosis: Diagnosis, worth: Mapping[str, Any] | None = None)
                 "effect": effect.effect,
                 "joint": effect.joint,
                 "description": effect.description,
-                "parameters": {name: dict(vars(parameter)) for name, parameter in effect.parameters.items()},
+                "parameters": {name: parameter.entry() for name, parameter in effect.parameters.items()},
                 "intervals": intervals(effect, diagnosis),
                 "size_told": effect.size_told,
-                "direct": {name: dict(vars(parameter)) for name, parameter in effect.direct.items()},
+                "direct": {name: parameter.entry() for name, parameter in effect.direct.items()},
                 "confounded_with": list(dict.fromkeys(confounder.effect for confounder in effect.confounded_with)),
                 "confounders": [
                     {"effect": confounder.effect, "joint": confounder.joint, "gain": confounder.gain}

@@ -92,11 +92,27 @@ def sentences(diagnosis: Diagnosis) -> tuple[str, ...]:
 
 
 def quantity(name: str, parameter: Parameter) -> str:
-    """Return a parameter in words, with its standard deviation or that nothing determines it."""
+    """Return a parameter in words, with its standard deviation, its interval or that nothing determines it."""
     unit = "" if parameter.unit == "1" else f" {parameter.unit}"
-    if not np.isfinite(parameter.std):
+    interval = parameter.interval
+    if interval is not None and np.any(np.isfinite(interval)):
+        return f"{name} {_written(parameter.value, 4)}{unit} ({ends(interval)}, 95 %)"
+    if interval is not None or not np.isfinite(parameter.std):
         return f"{name} about {parameter.value:.3g}{unit} (not told by recordings)"
     return f"{name} {parameter.value:.3g} ± {parameter.std:.1g}{unit}"
+
+
+def ends(interval: tuple[float, float]) -> str:
+    """Return an interval of which one end at least is told in words."""
+    low, high = (_written(end, 3) for end in interval)
+    if np.all(np.isfinite(interval)):
+        return f"{low} to {high}"
+    return f"above {low}" if np.isfinite(interval[0]) else f"below {high}"
+
+
+def _written(value: float, digits: int) -> str:
+    """Return a number rounded to so many digits, without an exponent below a million."""
+    return f"{float(f'{value:.{digits}g}'):g}"
 
 
 def _curved(diagnosis: Diagnosis, remainder: Unexplained) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -14,6 +15,7 @@ from scara_ident.diagnosis.found_effect import found_effects, not_found
 from scara_ident.diagnosis.next_steps import next_steps
 from scara_ident.effects import Parameter, effects_named
 from scara_ident.effects.measurement import shifted
+from scara_ident.effects.position import Spring
 from scara_ident.paper import table5_parameters
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import load_robot
@@ -44,6 +46,18 @@ def test_errors_go_from_effect_to_effect() -> None:
     assert first.after == second.before
     assert all(item.after[item.joint] < item.before[item.joint] for item in found if item.joint)
     assert all(0.0 < item.gain <= 1.0 and item.p_value < 1e-2 for item in found)
+
+
+class Reciprocal(Spring):
+    """A spring of which the compliance is told."""
+
+    def told(self, parameters: Mapping[str, Parameter]) -> Mapping[str, Parameter]:
+        return {name: replace(item, told_as=-1.0) for name, item in parameters.items()}
+
+
+def test_an_effect_says_as_what_its_parameters_are_told() -> None:
+    (found,) = diagnose(load_robot(), virtual_runs("spring:joint1"), bands=BANDS, catalogue=(Reciprocal(),)).effects
+    assert found.parameters["stiffness"].told_as == -1.0
 
 
 def test_what_a_second_encoder_tells_of_an_effect_that_was_not_added_is_said() -> None:

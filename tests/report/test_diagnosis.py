@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from scara_ident.diagnosis import diagnose
+from scara_ident.effects import Parameter
 from scara_ident.files import plain
 from scara_ident.model.model import build_model
 from scara_ident.model.urdf_values import urdf_values
@@ -96,3 +98,14 @@ def test_a_remainder_is_told_with_joint_signal_and_size():
     assert set(content["urdf_scale"]) <= {"joint1", "joint2"}
     stated = {row["name"]: row["urdf"] for row in content["parameters"]}
     assert stated["P_d1"] == pytest.approx(urdf_values(build_model(load_robot()))[0])
+
+
+def test_a_skewed_parameter_has_its_interval_an_open_end_null(result):
+    (effect,) = result.effects
+    skewed = {"stiffness": Parameter(3845.0, 2000.0, "N m/rad", told_as=-1.0)}
+    found = replace(result, effects=(replace(effect, parameters=skewed),))
+    entry = json.loads(json.dumps(plain(diagnosis_dict(found)), allow_nan=False))["effects"][0]["parameters"][
+        "stiffness"
+    ]
+    assert set(entry) == {"value", "std", "unit", "interval"}
+    assert entry["interval"] == [pytest.approx(1884.8, rel=1e-3), None]

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+import pytest
+
 from scara_ident.diagnosis import diagnose
 from scara_ident.diagnosis.effect_parameters import RotorInertia
 from scara_ident.diagnosis.held_out_gain import HeldOutGain
 from scara_ident.diagnosis.next_steps import next_steps
 from scara_ident.diagnosis.outcome import Unexplained
+from scara_ident.effects import Parameter
 from scara_ident.report.diagnosis import diagnosis_dict
-from scara_ident.report.diagnosis_words import sentences
+from scara_ident.report.diagnosis_words import quantity, sentences
 from scara_ident.robot.robot import load_robot
 from tests.diagnosis.made import BANDS, exact_runs, with_torque
 
@@ -26,6 +30,22 @@ def test_words_name_effect_value_and_error(result):
     ):
         assert text in said
     assert "Unexplained" not in said
+
+
+@pytest.mark.parametrize(
+    ("std", "told_as", "said"),
+    [
+        (150.0, -1.0, "stiffness 3.84e+03 ± 2e+02 N m/rad"),
+        (1504.0, 1.0, "stiffness 3.84e+03 ± 2e+03 N m/rad"),
+        (1504.0, -1.0, "stiffness 3845 N m/rad (2160 to 17700, 95 %)"),
+        (2000.0, -1.0, "stiffness 3845 N m/rad (above 1880, 95 %)"),
+        (9000.0, 0.5, "stiffness 3845 N m/rad (below 42900, 95 %)"),
+        (38450.0, 0.0, "stiffness about 3.84e+03 N m/rad (not told by recordings)"),
+        (np.inf, -1.0, "stiffness about 3.84e+03 N m/rad (not told by recordings)"),
+    ],
+)
+def test_an_interval_is_said_where_a_standard_deviation_says_too_little(std: float, told_as: float, said: str):
+    assert quantity("stiffness", Parameter(3845.0, std, "N m/rad", told_as)) == said
 
 
 def test_where_it_cannot_be_told_the_first_sentence_says_so(result):

@@ -8,8 +8,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from scara_ident.diagnosis.diagnose import Diagnosis
 from scara_ident.diagnosis.found_effect import FoundEffect
 from scara_ident.diagnosis.held_out_gain import HeldOutGain, words_of
@@ -42,7 +40,7 @@ from scara_ident.report.html.evidence import (
     variation_blocks,
 )
 from scara_ident.report.html.page import Page, parts
-from scara_ident.report.html.parameters import digits
+from scara_ident.report.html.parameters import digits, unsure
 from scara_ident.report.html.remainder import remainder_group
 from scara_ident.report.html.residual import residual_blocks
 from scara_ident.report.html.section import NamedSection, Section, notes_section
@@ -163,7 +161,7 @@ def _effect_words(effect: FoundEffect, context: DiagnosisContext) -> list[Block]
         [
             name(label),
             digits(parameter.value, parameter.std),
-            number(parameter.std, 2) if np.isfinite(parameter.std) else "not told",
+            unsure(parameter),
             "" if parameter.unit == "1" else superscripts(parameter.unit),
         ]
         for label, parameter in effect.parameters.items()

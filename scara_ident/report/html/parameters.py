@@ -7,10 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from scara_ident.effects import Parameter
 from scara_ident.estimation import Estimate, History, rls
 from scara_ident.estimation.consistent.estimator import ConsistentEstimate, links
 from scara_ident.estimation.observations import Observations
 from scara_ident.model.urdf_values import urdf_values
+from scara_ident.report.diagnosis_words import ends
 from scara_ident.report.html.blocks import Cell, Group, Selector, Table, Tag, name, number, superscripts
 from scara_ident.report.plot import Band, Drawing, Figure, Layer, Level, Line, Mark, Matrix, Panel, Plot, single
 from scara_ident.threads import one_blas_thread
@@ -58,6 +60,14 @@ def digits(value: float, std: float) -> str:
         return f"{value:.4g}"
     places = max(0, int(np.ceil(1.0 - np.log10(std))))
     return f"{value:z.{places}f}" if places <= 6 else f"{value:z.4g}"
+
+
+def unsure(parameter: Parameter) -> str:
+    """Return a standard deviation, or the interval where that says too little."""
+    interval = parameter.interval
+    if interval is None:
+        return number(parameter.std, 2) if np.isfinite(parameter.std) else "not told"
+    return f"{ends(interval)} (95 %)" if np.any(np.isfinite(interval)) else "not told"
 
 
 def link_table(estimate: ConsistentEstimate) -> Table:

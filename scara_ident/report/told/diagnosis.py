@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import nan
 from typing import TYPE_CHECKING, Any
 
 from scara_ident.diagnosis.diagnose import Diagnosis
@@ -30,13 +31,23 @@ def summary(diagnosis: Diagnosis) -> str:
 
 
 def columns(diagnosis: Diagnosis) -> dict[str, Any]:
-    """Return a row for each parameter of each effect found."""
+    """Return a row for each parameter of each effect found, with the ends of its interval where it has one."""
     rows = [
-        (found.effect, found.joint, name, parameter.value, parameter.std, parameter.unit, found.p_value, found.gain)
+        (
+            found.effect,
+            found.joint,
+            name,
+            each.value,
+            each.std,
+            each.unit,
+            found.p_value,
+            found.gain,
+            *(each.interval or (nan, nan)),
+        )
         for found in diagnosis.effects
-        for name, parameter in found.parameters.items()
+        for name, each in found.parameters.items()
     ]
-    names = ("effect", "joint", "parameter", "value", "std", "unit", "p_value", "gain")
+    names = ("effect", "joint", "parameter", "value", "std", "unit", "p_value", "gain", "low", "high")
     return {name: [row[k] for row in rows] for k, name in enumerate(names)}
 
 

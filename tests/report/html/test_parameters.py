@@ -6,9 +6,11 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
+from scara_ident.effects import Parameter
 from scara_ident.report.html import parameters
-from scara_ident.report.html.parameters import cheap_history, convergence_group, parameter_table
+from scara_ident.report.html.parameters import cheap_history, convergence_group, parameter_table, unsure
 
 
 def test_many_parameters_settle_in_pages(result):
@@ -40,3 +42,17 @@ def test_what_cancels_in_the_urdf_is_0_and_no_rounding(result, monkeypatch):
     values[:2] = 16.0, -2e-16
     monkeypatch.setattr(parameters, "urdf_values", lambda model: values)
     assert [row[2].text for row in parameter_table(result.estimate).rows[:3]] == ["16.00", "0", "–"]
+
+
+@pytest.mark.parametrize(
+    ("std", "told_as", "shown"),
+    [
+        (150.0, -1.0, "1.5e+02"),
+        (1504.0, -1.0, "2160 to 17700 (95 %)"),
+        (2000.0, -1.0, "above 1880 (95 %)"),
+        (38450.0, 0.0, "not told"),
+        (np.inf, 1.0, "not told"),
+    ],
+)
+def test_the_table_has_the_interval_where_a_standard_deviation_says_too_little(std: float, told_as: float, shown: str):
+    assert unsure(Parameter(3845.0, std, "N m/rad", told_as)) == shown

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from scara_ident.effects import Parameter
 from scara_ident.report.told.diagnosis import tables
 from tests.results import Results
 
@@ -18,7 +21,16 @@ def test_a_diagnosis_tells_the_effect_and_its_parameters(results: Results):
     assert frame["effect"].to_list() == ["spring", "spring"]
     stiffness, _ = frame.rows(named=True)
     assert stiffness["value"] == found.effects[0].parameters["stiffness"].value
+    assert np.isnan([stiffness["low"], stiffness["high"]]).all()
     assert found.plot().axes
+
+
+def test_the_frame_has_the_ends_of_an_interval(results: Results):
+    (effect,) = results.diagnosis.effects
+    skewed = Parameter(3845.0, 1504.0, "N m/rad", told_as=-1.0)
+    found = replace(results.diagnosis, effects=(replace(effect, parameters={"stiffness": skewed}),))
+    (row,) = found.to_frame().rows(named=True)
+    assert (row["low"], row["high"]) == skewed.interval
 
 
 def test_it_predicts_with_the_effect(results: Results):
