@@ -22,6 +22,7 @@ from scara_ident.estimation.noise_bias import NEGLIGIBLE, noise_shares
 from scara_ident.estimation.run_offsets import beside_offsets
 from scara_ident.estimation.run_variation import LEAST_RUNS
 from scara_ident.estimation.variation_between import run_variation
+from scara_ident.estimation.working_range import Told, told_directions
 
 # A rotor is told by the data where they leave less than this share of its prior's standard deviation.
 TOLD_SHARE = 0.7
@@ -155,7 +156,8 @@ def physical_parameters(step: SelectionStep, *, of_runs: bool = True, of_noise: 
         found.append(parameters)
     own = slice(state.linear)
     linear = LinearParameters(
-        *(state.value, covariance[own, own], state.settled, undetermined[own], spread.kind), None if bias is None else bias[own]
+        *(state.value, covariance[own, own], state.settled, undetermined[own], spread.kind),
+        None if bias is None else bias[own],
     )
     return PhysicalParameters(tuple(found), tuple(coefficients), _rotors(step, state, covariance), linear)
 
@@ -230,23 +232,41 @@ def _covariance(
     step: SelectionStep, state: Linearised, *, of_runs: bool, of_noise: bool
 ) -> tuple[Covariance, Array | None]:
     """Block covariance of all parameters, with what the priors leave open, which no residual shows, and the bias that is in it."""
-    inverse = merge([state.information, state.prior]).inverse()
+    whole, told = merge([state.information, state.prior]), _told_directions(step, state)
+    inverse = whole.inverse() if told is None else told.kept @ told.within(whole).inverse() @ told.kept.T
     # By what a row moves the fit; see `scara_ident.estimation.run_offsets`.
     rows = beside_offsets(replace(step.observations, joints=tuple(state.joints)), step.offsets)
     influence = rows.influence.joints
-    spread = block_covariance(inverse, state.best, influence, step.observations.owner, step.weights)
+    spread = block_covariance(inverse, state.least, influence, step.observations.owner, step.weights)
     matrix = spread.matrix
     if of_runs:
-        variation = run_variation(step.observations, state.joints, state.best, taken=rows.taken(inverse, step.weights))
+        variation = run_variation(step.observations, state.joints, state.least, taken=rows.taken(inverse, step.weights))
         if step.offsets is not None and len(step.observations.data.recordings) < LEAST_RUNS:
             variation = step.offsets
         matrix = matrix + variation.covariance(inverse, influence, step.weights)
-    bias = _noise_bias(step, state) if of_noise else None
+    if told is not None:
+        matrix = matrix + told.prior
+    bias = _noise_bias(step, state) if of_noise and told is None else None
     if bias is not None:
         matrix = matrix + np.outer(bias, bias)
     known = state.prior.factor[:, :-1]
     matrix = matrix + state.variance * inverse @ (known.T @ known) @ inverse
     return replace(spread, matrix=matrix), bias
+
+
+def _told_directions(step: SelectionStep, state: Linearised) -> Told | None:
+    """Return what is told and what is left open where data were corrected alone, see `told_directions`; None where all is told."""
+    if any(not item.corrects_data for item in state.chosen):
+        return None
+    told = told_directions(beside_offsets(step.observations, step.offsets).fitted, 1.0 / step.weights)
+    if told is None:
+        return None
+    # Imported where it is needed, as it takes as long as all else here.
+    from scipy.linalg import block_diag
+
+    more = state.information.parameters - len(told.kept)
+    left_open = np.vstack([told.left_open, np.zeros((more, told.left_open.shape[1]))])
+    return Told(block_diag(told.kept, np.eye(more)), left_open)
 
 
 def _noise_bias(step: SelectionStep, state: Linearised) -> Array | None:

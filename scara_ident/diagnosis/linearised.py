@@ -72,11 +72,18 @@ class Linearised:
         """The same, and the change of the nonlinear ones, shape (k + s,)."""
         return _solved(self.information, self.ties, self._fitted)
 
+    @cached_property
+    def least(self) -> Array:
+        """These with what is left of what was taken out of the data, shape (k + s,): blocks scatter about the least squares."""
+        return self.best if np.all(self._fitted == self._free) else _solved(self.information, self.ties, self._free)
+
+    @property
+    def _free(self) -> NDArray[np.bool_]:
+        return np.append(np.ones(self.linear, dtype=bool), np.isin(np.arange(len(self.unknowns)), self.following))
+
     @property
     def _fitted(self) -> NDArray[np.bool_]:
-        fitted = _left_in(self.chosen, self.places, self.information.parameters)
-        fitted[self.linear :] = np.isin(np.arange(len(self.unknowns)), self.following)
-        return fitted
+        return self._free & _left_in(self.chosen, self.places, self.information.parameters)
 
     @property
     def settled(self) -> tuple[Candidate, ...]:
