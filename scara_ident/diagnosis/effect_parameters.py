@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
+from scara_ident.diagnosis.at_estimate import at_estimate
 from scara_ident.diagnosis.candidate_tests import examine
 from scara_ident.diagnosis.candidates import Candidate, Rows
 from scara_ident.diagnosis.linearised import Linearised, linearise, with_estimate_slopes
@@ -131,6 +132,10 @@ def physical_parameters(step: SelectionStep, *, of_runs: bool = True, of_noise: 
     state = linearise(step)
     if of_runs or of_noise:
         state = with_estimate_slopes(step, state)
+        if state.following:
+            # Free until now they may be anywhere, and too far for one step.
+            step = replace(step, scene=at_estimate(step.scene, state.settled, state.value), chosen=state.settled)
+            state = with_estimate_slopes(step, linearise(step))
     spread, bias = _covariance(step, state, of_runs=of_runs, of_noise=of_noise)
     covariance = spread.matrix
     undetermined = merge([state.information, state.prior]).solve().undetermined

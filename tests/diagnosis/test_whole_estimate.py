@@ -91,7 +91,11 @@ def test_what_was_taken_out_of_the_data_leaves_all_parameters_where_they_are() -
 
 def warming(draws: int) -> Array:
     """Friction of the first joint, of a gear that warms up: value and std, with columns held and as told, (draws, 2, 2)."""
-    robot, friction, time = load_robot(), [(0.6, 0.3, 0.0, 0.0, 0.0), (0.2, 0.1, 0.0, 0.0, 0.0)], np.arange(1500) / 125.0
+    robot, friction, time = (
+        load_robot(),
+        [(0.6, 0.3, 0.0, 0.0, 0.0), (0.2, 0.1, 0.0, 0.0, 0.0)],
+        np.arange(1500) / 125.0,
+    )
     runs, noise, found = [], np.array([0.02, 0.01]), []
     for k in range(3):
         q, v, a = sines(np.random.default_rng(60 + k), time, 2)
