@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from numpy.typing import ArrayLike
 
 from scara_ident.arrays import Array
+from scara_ident.diagnosis.confounding import confounders
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
 from scara_ident.diagnosis.effect_parameters import PhysicalParameters, RotorInertia
 from scara_ident.diagnosis.evidence import Evidence
@@ -30,6 +31,7 @@ from scara_ident.diagnosis.standing_lines import standing_lines, tentative_lines
 from scara_ident.diagnosis.tentative import TentativeEffect, tentative_effects
 from scara_ident.diagnosis.validation import validated
 from scara_ident.diagnosis.verdict import Verdict, verdict_of, weighed_evidence
+from scara_ident.diagnosis.whole_estimate import with_whole_estimate
 from scara_ident.diagnosis.work import first, searching
 from scara_ident.effects import Effect, EffectTerm
 from scara_ident.effects.aliases import Alias, aliases
@@ -237,14 +239,18 @@ def diagnose(
     task = SearchTask(base, families, criteria, searching(work, band_given=given))
     outcome, events = _without_events(task, observations, free=not given)
     work("comparing what was found with what else it could be", task.progress.stop)
-    found, after = outcome.search, outcome.after
-    step = replace(found.step, weights=after.weights)
+    found = outcome.search
+    step = replace(found.step, weights=outcome.after.weights)
+    whole = replace(found.whole(step), variation=outcome.after.offsets)
+    parameters = parameters_of_laws(whole) if whole.chosen else PhysicalParameters()
+    groups = confounders(step, found.decisions, found.first, found.doubtful) if found.chosen else []
+    final = outcome if parameters.linear is None else with_whole_estimate(outcome, parameters.linear)
     held_out, useless = with_rows(held_out.at(found.bands), needed=False)
-    held = validated(outcome, held_out)
-    whole = replace(found.whole(step), variation=after.offsets)
-    parameters = parameters_of_laws(whole) if whole.chosen else PhysicalParameters((), (), ())
+    held = validated(final, held_out)
+    # What was asked beside the model stays as it was asked.
+    outcome = replace(final, search=found)
     readings = direct_readings(found, families, criteria.rotor_inertia_std)
-    effects = found_effects(found, step, parameters, readings, held.gains)
+    effects = found_effects(found, groups, parameters, readings, held.gains)
     refused = (*outcome.demoted, *outcome.suspected)
     events += held.events
     notes += [note for note in (*useless, *held.notes) if note not in notes]
@@ -265,7 +271,7 @@ def diagnose(
         verdict_of(outcome, effects, shown),
         found,
         found.start,
-        after,
+        outcome.after,
         found.uncorrected,
         outcome.training,
         held.before,

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
+from scara_ident.diagnosis.at_estimate import at_estimate
 from scara_ident.diagnosis.candidate_tests import examine
 from scara_ident.diagnosis.candidates import Candidate, Rows
 from scara_ident.diagnosis.linearised import Linearised, linearise, with_estimate_slopes
@@ -16,12 +17,13 @@ from scara_ident.diagnosis.nonlinear_fit import tune
 from scara_ident.diagnosis.selection_step import SelectionStep
 from scara_ident.diagnosis.unknowns import sides
 from scara_ident.effects import Effect, Parameter, Scene
-from scara_ident.estimation.covariance import block_covariance
+from scara_ident.estimation.covariance import Covariance, block_covariance
 from scara_ident.estimation.information import merge
 from scara_ident.estimation.noise_bias import NEGLIGIBLE, noise_shares
 from scara_ident.estimation.run_offsets import beside_offsets
 from scara_ident.estimation.run_variation import LEAST_RUNS
 from scara_ident.estimation.variation_between import run_variation
+from scara_ident.estimation.working_range import Told, told_directions
 
 # A rotor is told by the data where they leave less than this share of its prior's standard deviation.
 TOLD_SHARE = 0.7
@@ -68,13 +70,41 @@ class Coefficients:
         return np.asarray(np.sign(self.value) * np.maximum(np.abs(self.value) - reach, 0.0))
 
 
+@dataclass(frozen=True, eq=False)
+class LinearParameters(Coefficients):
+    """All linear parameters of a model with effects (k,), those of the base model first, and their covariance (k, k).
+
+    Attributes
+    ----------
+    chosen : tuple of Candidate
+        The effects, whose nonlinear parameters go with coefficients where they are these once more.
+    undetermined : ndarray of bool, shape (k,)
+    std_kind : str
+        How the covariance was found, see `scara_ident.estimation.covariance`.
+    noise_bias : ndarray, shape (k,), or None
+        By how much the noise of positions moves them, which is part of the covariance; None where negligible or not looked for.
+    """
+
+    chosen: tuple[Candidate, ...]
+    undetermined: NDArray[np.bool_]
+    std_kind: str
+    noise_bias: Array | None
+
+
 @dataclass(frozen=True)
 class PhysicalParameters:
-    """Of each chosen effect its parameters and its coefficients, and the rotors that these depend on."""
+    """Of each chosen effect its parameters and its coefficients, the rotors that these depend on, and the model that all are of.
 
-    effects: tuple[dict[str, Parameter], ...]
-    coefficients: tuple[Coefficients, ...]
-    rotors: tuple[RotorInertia, ...]
+    Attributes
+    ----------
+    linear : LinearParameters or None
+        Beside all that is nonlinear, of the estimate that coefficients are part of; None of a model without effects.
+    """
+
+    effects: tuple[dict[str, Parameter], ...] = ()
+    coefficients: tuple[Coefficients, ...] = ()
+    rotors: tuple[RotorInertia, ...] = ()
+    linear: LinearParameters | None = None
 
 
 def told_size(effect: Effect, parameters: Mapping[str, Parameter], stds: float) -> bool:
@@ -102,7 +132,12 @@ def physical_parameters(step: SelectionStep, *, of_runs: bool = True, of_noise: 
     state = linearise(step)
     if of_runs or of_noise:
         state = with_estimate_slopes(step, state)
-    covariance = _covariance(step, state, of_runs=of_runs, of_noise=of_noise)
+        if state.following:
+            # Free until now they may be anywhere, and too far for one step.
+            step = replace(step, scene=at_estimate(step.scene, state.settled, state.value), chosen=state.settled)
+            state = with_estimate_slopes(step, linearise(step))
+    spread, bias = _covariance(step, state, of_runs=of_runs, of_noise=of_noise)
+    covariance = spread.matrix
     undetermined = merge([state.information, state.prior]).solve().undetermined
     found: list[dict[str, Parameter]] = []
     coefficients = []
@@ -126,7 +161,12 @@ def physical_parameters(step: SelectionStep, *, of_runs: bool = True, of_noise: 
                     unknown.value, float(np.sqrt(max(variance, 0.0))), unit
                 )
         found.append(parameters)
-    return PhysicalParameters(tuple(found), tuple(coefficients), _rotors(step, state, covariance))
+    own = slice(state.linear)
+    linear = LinearParameters(
+        *(state.value, covariance[own, own], state.settled, undetermined[own], spread.kind),
+        None if bias is None else bias[own],
+    )
+    return PhysicalParameters(tuple(found), tuple(coefficients), _rotors(step, state, covariance), linear)
 
 
 def _beside(step: SelectionStep, candidate: Candidate, state: Linearised) -> NDArray[np.intp]:
@@ -195,30 +235,51 @@ def parameters_beside(step: SelectionStep, candidate: Candidate) -> dict[str, Pa
     return dict(candidate.effect.parameters(step.scene, candidate.member, alone.value, covariance))
 
 
-def _covariance(step: SelectionStep, state: Linearised, *, of_runs: bool, of_noise: bool) -> Array:
-    """Block covariance of all parameters, with what the priors leave open, which no residual shows."""
-    inverse = merge([state.information, state.prior]).inverse()
-    value = np.concatenate([state.value, np.zeros(len(state.unknowns))])
+def _covariance(
+    step: SelectionStep, state: Linearised, *, of_runs: bool, of_noise: bool
+) -> tuple[Covariance, Array | None]:
+    """Block covariance of all parameters, with what the priors leave open, which no residual shows, and the bias that is in it."""
+    whole, told = merge([state.information, state.prior]), _told_directions(step, state)
+    inverse = whole.inverse() if told is None else told.kept @ told.within(whole).inverse() @ told.kept.T
     # By what a row moves the fit; see `scara_ident.estimation.run_offsets`.
     rows = beside_offsets(replace(step.observations, joints=tuple(state.joints)), step.offsets)
     influence = rows.influence.joints
-    spread = block_covariance(inverse, value, influence, step.observations.owner, step.weights).matrix
+    spread = block_covariance(inverse, state.least, influence, step.observations.owner, step.weights)
+    matrix = spread.matrix
     if of_runs:
-        variation = run_variation(step.observations, state.joints, value, taken=rows.taken(inverse, step.weights))
+        variation = run_variation(step.observations, state.joints, state.least, taken=rows.taken(inverse, step.weights))
         if step.offsets is not None and len(step.observations.data.recordings) < LEAST_RUNS:
             variation = step.offsets
-        spread = spread + variation.covariance(inverse, influence, step.weights)
-    if of_noise:
-        bias = _noise_bias(step, state)
-        spread = spread + np.outer(bias, bias)
+        matrix = matrix + variation.covariance(inverse, influence, step.weights)
+    if told is not None:
+        matrix = matrix + told.prior
+    bias = _noise_bias(step, state) if of_noise and told is None else None
+    if bias is not None:
+        matrix = matrix + np.outer(bias, bias)
     known = state.prior.factor[:, :-1]
-    return np.asarray(spread + state.variance * inverse @ (known.T @ known) @ inverse)
+    matrix = matrix + state.variance * inverse @ (known.T @ known) @ inverse
+    return replace(spread, matrix=matrix), bias
 
 
-def _noise_bias(step: SelectionStep, state: Linearised) -> Array:
+def _told_directions(step: SelectionStep, state: Linearised) -> Told | None:
+    """Return what is told and what is left open where data were corrected alone, see `told_directions`; None where all is told."""
+    if any(not item.corrects_data for item in state.chosen):
+        return None
+    told = told_directions(beside_offsets(step.observations, step.offsets).fitted, 1.0 / step.weights)
+    if told is None:
+        return None
+    # Imported where it is needed, as it takes as long as all else here.
+    from scipy.linalg import block_diag
+
+    more = state.information.parameters - len(told.kept)
+    left_open = np.vstack([told.left_open, np.zeros((more, told.left_open.shape[1]))])
+    return Told(block_diag(told.kept, np.eye(more)), left_open)
+
+
+def _noise_bias(step: SelectionStep, state: Linearised) -> Array | None:
     """Return by how much the noise of positions moves all parameters of a fit, see `scara_ident.estimation.noise_bias`."""
     if max(noise_shares(step.observations.data), default=0.0) < NEGLIGIBLE:
-        return np.zeros(state.information.parameters)
+        return None
     # A resonance with little damping bends too much for one step.
     tied = any(item.effect.tie(step.scene, item.member) is not None for item in step.chosen)
     noisier = tune(step.noisier) if tied else step.noisier

@@ -8,11 +8,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from scara_ident.diagnosis.candidates import Candidate
-from scara_ident.diagnosis.confounding import Confounder, confounders
+from scara_ident.diagnosis.confounding import Confounder
 from scara_ident.diagnosis.effect_parameters import Coefficients, PhysicalParameters, told_size
 from scara_ident.diagnosis.held_out_gain import HeldOutGain
 from scara_ident.diagnosis.search import Search
-from scara_ident.diagnosis.selection_step import SelectionStep
 from scara_ident.diagnosis.setpoints import OR_ELSE, may_be_setpoints
 from scara_ident.effects import Effect, Parameter
 from scara_ident.estimation.run_offsets import rms_of
@@ -101,7 +100,7 @@ def said(values: Mapping[str, Parameter]) -> str:
 
 def found_effects(
     found: Search,
-    step: SelectionStep,
+    groups: Sequence[tuple[Confounder, ...]],
     parameters: PhysicalParameters,
     readings: Readings,
     held_out: Mapping[str, HeldOutGain],
@@ -109,9 +108,13 @@ def found_effects(
     """Return the effects that came in, in that order, with their parameters and what cannot be told from them.
 
     What was taken out of the data in several steps is one effect, as it came in first.
+
+    Parameters
+    ----------
+    groups : sequence of tuple of Confounder
+        What cannot be told from each effect in the model, see `confounders`.
     """
     scene = found.scene
-    groups = confounders(step, found.decisions, found.first, found.doubtful) if found.chosen else []
     labels = [item.label(scene) for item in found.chosen]
     results: list[FoundEffect] = []
     before = rms_of(found.start.value, found.uncorrected)

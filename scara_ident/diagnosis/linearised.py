@@ -44,6 +44,8 @@ class Linearised:
         Of all weighted rows, with offsets of runs as noise; its parameters are k linear ones, then s nonlinear ones.
     ties : Information
         Rows that hold the coefficients of tied effects to what the nonlinear parameters and the rigid bodies say of them.
+    following : tuple of int
+        Which nonlinear parameters go with the coefficient that they are once more; all others stay where they are.
     """
 
     scene: Scene
@@ -53,16 +55,46 @@ class Linearised:
     joints: tuple[JointRows, ...]
     information: Information
     ties: Information
+    following: tuple[int, ...] = ()
 
     @property
     def linear(self) -> int:
         """Number of linear parameters k."""
         return self.information.parameters - len(self.unknowns)
 
-    @cached_property
+    @property
     def value(self) -> Array:
-        """Linear parameters that fit best at the present nonlinear ones, shape (k,)."""
-        return _solved(self.information, self.ties, self.linear)
+        """Linear parameters that fit best at the present nonlinear ones, shape (k,); none of what was taken out of the data."""
+        return self.best[: self.linear]
+
+    @cached_property
+    def best(self) -> Array:
+        """The same, and the change of the nonlinear ones, shape (k + s,)."""
+        return _solved(self.information, self.ties, self._fitted)
+
+    @cached_property
+    def least(self) -> Array:
+        """These with what is left of what was taken out of the data, shape (k + s,): blocks scatter about the least squares."""
+        return self.best if np.all(self._fitted == self._free) else _solved(self.information, self.ties, self._free)
+
+    @property
+    def _free(self) -> NDArray[np.bool_]:
+        return np.append(np.ones(self.linear, dtype=bool), np.isin(np.arange(len(self.unknowns)), self.following))
+
+    @property
+    def _fitted(self) -> NDArray[np.bool_]:
+        return self._free & _left_in(self.chosen, self.places, self.information.parameters)
+
+    @property
+    def settled(self) -> tuple[Candidate, ...]:
+        """The effects with the nonlinear parameters that these have."""
+        chosen = list(self.chosen)
+        for k in self.following:
+            item = self.unknowns[k]
+            if item.owner is not None:
+                moved = item.moved(float(self.best[self.linear + k]))
+                chosen[item.owner] = moved_candidate(chosen[item.owner], item.place, moved)
+        return tuple(chosen)
 
     @cached_property
     def rows(self) -> int:
@@ -72,8 +104,7 @@ class Linearised:
     @cached_property
     def variance(self) -> float:
         """Mean squared residual of a weighted row."""
-        value = np.concatenate([self.value, np.zeros(len(self.unknowns))])
-        return self.information.residual_sum(value) / self.rows
+        return self.information.residual_sum(self.best) / self.rows
 
     @property
     def error(self) -> float:
@@ -81,8 +112,7 @@ class Linearised:
         prior = sum(((item.value - item.nominal) / item.spread) ** 2 for item in self.unknowns)
         left = self.variance * self.rows
         if len(self.ties.factor):
-            value = np.concatenate([_solved(self.information, self._held, self.linear), np.zeros(len(self.unknowns))])
-            left = self.information.residual_sum(value)
+            left = self.information.residual_sum(_solved(self.information, self._held, self._fitted))
         return left + self.variance * prior
 
     @property
@@ -170,7 +200,8 @@ def linearise(step: SelectionStep) -> Linearised:
             size = _size(joints, int(bounds[owner]), weights)
             ties.append(TIGHTNESS * size * _tie_row(scene, chosen, unknowns, owner, tie, int(bounds[owner]), linear))
     held = Information(np.array(ties).reshape(-1, total + 1), 0.0)
-    value = _solved(_pooled(joints, total, weights, step.offsets), held, linear)
+    fitted = np.append(_left_in(chosen, places, linear), np.zeros(len(unknowns), dtype=bool))
+    value = _solved(_pooled(joints, total, weights, step.offsets), held, fitted)[:linear]
     changes = [_change(scene, columns, chosen, item, places, value, slopes) for item in unknowns]
     extended = tuple(_beside(rows, joint, changes, linear) for joint, rows in enumerate(joints))
     information = _pooled(extended, total, weights, step.offsets)
@@ -193,15 +224,16 @@ def with_estimate_slopes(step: SelectionStep, state: Linearised) -> Linearised:
             joints = _with_slopes(joints, step.columns.estimate_slopes(scene, candidate, state.value[place]), 0, scene)
     if joints is state.joints:
         return state
-    rows = []
-    for k, item in enumerate(state.unknowns, state.linear):
+    rows, following = [], []
+    for k, item in enumerate(state.unknowns):
         if item.owner is not None and step.chosen[item.owner].effect.nonlinear[item.place].of_coefficient:
             row, column = np.zeros(state.information.parameters + 1), state.places[item.owner].start
-            row[[column, k, -1]] = 1.0, -1.0, state.value[column]
+            row[[column, state.linear + k, -1]] = 1.0, -1.0, item.value
+            following.append(k)
             rows.append(TIGHTNESS * _size(joints, column, step.weights) * row)
     ties = merge([state.ties, Information(np.array(rows), 0.0)]) if rows else state.ties
     information = _pooled(joints, state.information.parameters, step.weights, step.offsets)
-    return replace(state, joints=joints, information=information, ties=ties)
+    return replace(state, joints=joints, information=information, ties=ties, following=tuple(following))
 
 
 def freed_model(step: SelectionStep) -> FittedModel:
@@ -213,10 +245,20 @@ def freed_model(step: SelectionStep) -> FittedModel:
     return step.fitted(state.joints, state.information.parameters)
 
 
-def _solved(information: Information, ties: Information, linear: int) -> Array:
-    """Return the linear parameters that fit best where the nonlinear ones stay, ties kept."""
-    held = Information(ties.factor[:, [*range(linear), -1]], 0.0)
-    return merge([information.select(range(linear)), held]).solve().value
+def _left_in(chosen: Sequence[Candidate], places: Sequence[slice], count: int) -> NDArray[np.bool_]:
+    """Return which of so many parameters are of what is in the model: nothing is left of what was taken out of the data."""
+    kept = np.ones(count, dtype=bool)
+    for candidate, place in zip(chosen, places, strict=True):
+        kept[place] = not candidate.corrects_data
+    return kept
+
+
+def _solved(information: Information, ties: Information, fitted: NDArray[np.bool_]) -> Array:
+    """Return the parameters that fit best, ties kept; those not fitted are zero."""
+    value, places = np.zeros(len(fitted)), np.flatnonzero(fitted)
+    held = Information(ties.factor[:, [*places, -1]], 0.0)
+    value[places] = merge([information.select(places), held]).solve().value
+    return value
 
 
 def _with_slopes(

@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
-from scara_ident.diagnosis.effect_parameters import PhysicalParameters, physical_parameters
+import numpy as np
+from numpy.typing import NDArray
+
+from scara_ident.diagnosis.effect_parameters import LinearParameters, PhysicalParameters, physical_parameters
 from scara_ident.diagnosis.exchange import same
 from scara_ident.diagnosis.nonlinear_fit import tune
 from scara_ident.diagnosis.other_minima import as_good, widened
@@ -16,21 +19,56 @@ def parameters_of_laws(step: SelectionStep) -> PhysicalParameters:
     """Return the physical parameters of all chosen effects, as uncertain as it is by which law they are.
 
     Where another law of an effect explains as much, its parameters by that one are as good: what they differ by is one
-    more standard deviation. So it is with other fits of effects that act together, see `as_good`. An effect by another law than
-    that of its name has what tells the law among its parameters.
+    more standard deviation, and so it is of all linear parameters beside it. So it is with other fits of effects that act together,
+    see `as_good`. An effect by another law than that of its name has what tells the law among its parameters.
     """
     own = physical_parameters(step)
-    effects = list(own.effects)
+    effects, linear = list(own.effects), own.linear
+    assert linear is not None
     for place, item in enumerate(step.chosen):
         effects[place] = {**effects[place], **item.effect.law()}
         for other in _as_good(step, place):
-            effects[place] = widened(effects[place], physical_parameters(other).effects[place])
+            told = physical_parameters(other)
+            effects[place] = widened(effects[place], told.effects[place])
+            linear = _apart(linear, told, np.arange(len(linear.value)))
     for other in as_good(step):
-        told = physical_parameters(other).effects
+        told = physical_parameters(other)
         for place, item in enumerate(step.chosen):
             if item.effect.together:
-                effects[place] = widened(effects[place], told[place])
-    return replace(own, effects=tuple(effects))
+                effects[place] = widened(effects[place], told.effects[place])
+        # What other rows say of the base model is less, and no other fit of these.
+        same_rows = other.columns is step.columns
+        linear = _apart(linear, told, np.arange(len(linear.value)) if same_rows else _places(step, own))
+    return replace(own, effects=tuple(effects), linear=linear)
+
+
+def _apart(own: LinearParameters, other: PhysicalParameters, places: NDArray[np.intp]) -> LinearParameters:
+    """Return linear parameters for which what some of them differ by in a fit as good is one more standard deviation.
+
+    Parameters
+    ----------
+    own : LinearParameters
+        Before any was widened, or after.
+    other : PhysicalParameters
+        Of the same parameters, and perhaps more after them.
+    places : ndarray of int
+    """
+    assert other.linear is not None
+    change = np.zeros(len(own.value))
+    change[places] = other.linear.value[places] - own.value[places]
+    return replace(own, covariance=own.covariance + np.outer(change, change))
+
+
+def _places(step: SelectionStep, own: PhysicalParameters) -> NDArray[np.intp]:
+    """Return the places of the coefficients of effects that act together."""
+    sizes = [len(item.value) for item in own.coefficients]
+    stops = step.observations.parameters + np.cumsum(sizes)
+    ranges = [
+        np.arange(stop - size, stop)
+        for item, size, stop in zip(step.chosen, sizes, stops, strict=True)
+        if item.effect.together
+    ]
+    return np.concatenate(ranges)
 
 
 def _as_good(step: SelectionStep, place: int) -> Iterator[SelectionStep]:

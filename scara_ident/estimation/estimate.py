@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from scara_ident.arrays import Array
 from scara_ident.estimation.information import Information, merge
 from scara_ident.estimation.observations import Observations
-from scara_ident.estimation.run_offsets import rms_beside_own
+from scara_ident.estimation.run_offsets import beside_offsets, rms_beside_own
 from scara_ident.estimation.run_variation import RunVariation
 from scara_ident.manners import Saved
 from scara_ident.model.model import TorqueModel
@@ -80,6 +80,9 @@ class Estimate(Saved, told_by="estimate"):
     noise_bias : ndarray, shape (p,), or None
         By how much the noise of positions moves the parameters, which is part of the covariance; None where negligible
         or not looked for.
+    followed : ndarray, shape (p,), or None
+        By how much the parameters differ from those that would fit the same columns best, where columns follow them; None where
+        these are they.
     """
 
     model: TorqueModel
@@ -93,6 +96,18 @@ class Estimate(Saved, told_by="estimate"):
     variation: RunVariation | None = field(default=None, kw_only=True)
     offsets: RunVariation | None = field(default=None, kw_only=True)
     noise_bias: Array | None = field(default=None, kw_only=True)
+    followed: Array | None = field(default=None, kw_only=True)
+
+    def rows(self, observations: Observations) -> tuple[Information, ...]:
+        """Return the rows of each joint as the estimate saw them, which its parameters fit best.
+
+        Parameters
+        ----------
+        observations : Observations
+            That it was estimated from.
+        """
+        joints = beside_offsets(observations, self.offsets).fitted.by_joint
+        return joints if self.followed is None else tuple(item.moved(self.followed) for item in joints)
 
     @property
     def std(self) -> Array:

@@ -137,6 +137,12 @@ class Information(Frozen):
             whole = triangular(np.vstack([factor, *factors]))
         return Information(whole, decay * self.rows + count)
 
+    def moved(self, change: Array) -> Information:
+        """Return this information of rows whose torque parameters (p,) that differ by so much explain as well."""
+        factor = self.factor.copy()
+        factor[:, -1] += factor[:, :-1] @ change
+        return Information(factor, self.rows)
+
     def scaled(self, weight: float) -> Information:
         """Return this information with every row multiplied by ``weight``."""
         return Information(weight * self.factor, self.rows)

@@ -16,7 +16,6 @@ from scara_ident.effects import EffectTerm
 from scara_ident.estimation.consistent.estimator import ConsistentEstimate
 from scara_ident.estimation.estimate import joint_errors
 from scara_ident.estimation.information import Information, weighted
-from scara_ident.estimation.run_offsets import beside_offsets
 from scara_ident.identification.identify import Identification
 from scara_ident.model.model import TorqueModel
 from scara_ident.model.terms import Friction
@@ -45,7 +44,7 @@ class IdentifiedModel:
     weights : ndarray, shape (n,)
         Of each joint's rows in the estimate.
     fitted : tuple of Information
-        Training rows as the estimate saw them, per joint: offsets of runs are noise, see `Estimate.offsets`.
+        Training rows as the estimate saw them, per joint, see `Estimate.rows`.
     training, validation : tuple of Information
         Per joint, within the band; validation has no rows where nothing was held out.
     standard : ndarray, shape (11 n,), or None
@@ -194,7 +193,7 @@ def identified_model(found: Identification | Diagnosis) -> IdentifiedModel:
         before=before.value,
         undetermined=estimate.undetermined,
         weights=estimate.weights,
-        fitted=beside_offsets(fitted, estimate.offsets).fitted.by_joint,
+        fitted=estimate.rows(fitted),
         training=tuple(fitted.by_joint),
         validation=tuple(held_out.by_joint),
         standard=estimate.standard if isinstance(estimate, ConsistentEstimate) else None,

@@ -21,7 +21,6 @@ from scara_ident.estimation import Estimate
 from scara_ident.estimation.consistent.estimator import ConsistentEstimate
 from scara_ident.estimation.information import Information
 from scara_ident.estimation.observations import Observations
-from scara_ident.estimation.run_offsets import beside_offsets
 from scara_ident.export.identified_model import IdentifiedModel
 from scara_ident.files import path_fault, unreadable
 from scara_ident.memory import read_text
@@ -40,9 +39,10 @@ def rebuild_entry(estimate: Estimate, training: Observations, validation: Observ
     """Return what a result file holds under ``rebuild``."""
     robot, terms = estimate.model.robot, estimate.model.terms
     effects = [term for term in terms if isinstance(term, EffectTerm)]
-    kinds = {"training": training, "validation": validation}
-    if estimate.offsets is not None:
-        kinds["fitted"] = beside_offsets(training, estimate.offsets).fitted
+    active = training.model.active
+    kinds = {"training": training.by_joint, "validation": validation.by_joint}
+    if estimate.offsets is not None or estimate.followed is not None:
+        kinds["fitted"] = estimate.rows(training)
     return {
         "robot": _robot_entry(robot),
         "covariance": _packed(estimate.covariance),
@@ -52,7 +52,7 @@ def rebuild_entry(estimate: Estimate, training: Observations, validation: Observ
         "scene": _scene_entry(effects[0].scene) if effects else None,
         "effects": [_effect_entry(term.effect, term.member) for term in effects],
         "observations": {
-            kind: [_factor_entry(item, own) for item, own in zip(rows.by_joint, rows.model.active, strict=True)]
+            kind: [_factor_entry(item, own) for item, own in zip(rows, active, strict=True)]
             for kind, rows in kinds.items()
         },
     }

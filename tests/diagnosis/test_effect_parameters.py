@@ -26,6 +26,7 @@ from scara_ident.effects import Member, Parameter
 from scara_ident.effects.coupling import DriveCoupling
 from scara_ident.effects.friction import Stribeck
 from scara_ident.effects.gear import TransmissionLoss
+from scara_ident.effects.measurement import TimeDelay
 from scara_ident.effects.position import Spring
 from scara_ident.effects.tilt import BaseTilt
 from scara_ident.estimation import wls
@@ -39,6 +40,7 @@ from tests.diagnosis.made import NOISE, complete, exact_runs, observed, step_bes
 from tests.effects.scenes import scene_of
 from tests.effects.test_position import without_offset
 from tests.effects.test_tilt import leaning
+from tests.estimation.test_working_range import observations as hardly_moving
 
 Array = NDArray[np.float64]
 
@@ -231,3 +233,32 @@ def test_what_a_gear_loses_is_told_where_one_parameter_is_its_load(tmp_path: Pat
     found = fits(robot, runs, Candidate(TransmissionLoss(), Member(0, (share,))), np.array([2.0]), 24)
     value, std = found["loss_coefficient"].T
     assert np.median(std) == pytest.approx(np.std(value), rel=0.4)
+
+
+def test_what_rows_leave_open_is_no_less_known_beside_what_was_taken_out_of_the_data() -> None:
+    """Of a joint that hardly moves directions are left at zero, and do not make all others unsure."""
+    seen = hardly_moving(load_robot(), 2, (0.2, 2e-4))
+    start = wls(seen)
+    told = ~start.undetermined
+    assert 0 < np.count_nonzero(told) < len(told)
+    scene, delay = scene_at(seen.model, start.value, seen), Candidate(TimeDelay(), Member(None))
+    step = SelectionStep(scene, CandidateColumns(seen), (delay,), start.weights, 10, CRITERIA, start.offsets)
+    linear = physical_parameters(step).linear
+    assert linear is not None
+    # Nothing is left to find of what was taken out.
+    assert linear.value[-1] == 0.0
+    std = np.sqrt(np.diag(linear.covariance))[:-1]
+    assert std[told] == pytest.approx(start.std[told], rel=0.2)
+
+
+def test_what_goes_with_a_coefficient_is_that_coefficient_from_wherever_it_began() -> None:
+    """One with a load that is a mass alone it ended at its bound, and one step from there left a fifth more of the torque."""
+    shared = exact_runs()
+    ends = []
+    for start in (0.05, 0.75):
+        step = step_beside(shared, [Candidate(TransmissionLoss(), Member(1, (start,)))], WEIGHTS)
+        linear = physical_parameters(step).linear
+        assert linear is not None
+        assert linear.chosen[0].member.nonlinear[0] == pytest.approx(max(linear.value[-1], 0.005), abs=1e-6)
+        ends.append(linear.value / np.sqrt(np.diag(linear.covariance)))
+    assert ends[0] == pytest.approx(ends[1], abs=0.05)

@@ -74,7 +74,7 @@ def test_a_delay_that_was_taken_out_in_two_steps_is_one_effect() -> None:
     (first,) = search.steps
     twice = replace(search, steps=(first, replace(first, rms=(0.0, 0.0))))
     parameters = physical_parameters(twice.whole(twice.step))
-    (effect,) = found_effects(twice, twice.step, parameters, {}, {})
+    (effect,) = found_effects(twice, (), parameters, {}, {})
     assert effect.effect == "time_delay"
     assert tuple(effect.after.values()) == tuple(first.rms)
 
