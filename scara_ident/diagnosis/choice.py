@@ -16,6 +16,7 @@ from scara_ident.diagnosis.linearised import freed_model
 from scara_ident.diagnosis.noise_check import noise_objection
 from scara_ident.diagnosis.nonlinear_fit import tune
 from scara_ident.diagnosis.remainder_check import remainder_objection
+from scara_ident.diagnosis.same_errors import same
 from scara_ident.diagnosis.selection_step import SelectionStep, best_of_each, points_of_lines
 from scara_ident.diagnosis.setpoints import setpoint_objection
 from scara_ident.diagnosis.variation_check import best_first, variation_objection
@@ -89,7 +90,7 @@ def _soundest(
         others = [replace(item, effect=other) for item in sure for other in item.effect.other_laws()]
         refined += step.refine(step.judge(others)) if others else []
         pairs = [(step, item) for item in refined if item.accepted] + [pair for pair in leaders if pair[0] is not step]
-        for own, decision in best_first(pairs):
+        for own, decision in _intervals_last(best_first(pairs)):
             why = objection(own, decision)
             if why is not None and decision.candidate.effect.together and own.scene.together:
                 # Beside others that it acts with a coarse fit ends early: what they took up of it goes back to it slowly.
@@ -100,6 +101,26 @@ def _soundest(
             refused[decision.label] = decision.refused(why)
         open_ = open_[len(leaders) :]
     return None
+
+
+def _intervals_last(order: list[tuple[SelectionStep, Decision]]) -> list[tuple[SelectionStep, Decision]]:
+    """Put what acts in intervals after the same effect without them where that leaves no more than chance makes.
+
+    Where intervals begin and end all rows told, those held out among them, so that what they remove there says too much.
+    """
+    for place, (own, decision) in enumerate(order):
+        effect = decision.candidate.effect
+        if effect.in_intervals:
+            plainer = [
+                pair
+                for pair in order[place + 1 :]
+                if (other := pair[1].candidate.effect).name == effect.name
+                and not other.in_intervals
+                and same((own, decision), pair)
+            ]
+            rest = [pair for pair in order[place:] if pair not in plainer]
+            return [*order[:place], *plainer, *rest]
+    return order
 
 
 def _sure_once_refined(step: SelectionStep, best: Sequence[Decision], enough: float) -> list[Decision]:

@@ -10,7 +10,8 @@ import numpy as np
 from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.choice import fitted_beside
-from scara_ident.diagnosis.exchange import near_in_place, same
+from scara_ident.diagnosis.exchange import near_in_place
+from scara_ident.diagnosis.same_errors import same
 from scara_ident.diagnosis.selection_step import SelectionStep, observed
 from scara_ident.diagnosis.variation_check import counted
 from scara_ident.effects import Scene

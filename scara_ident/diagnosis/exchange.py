@@ -12,8 +12,7 @@ from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.candidate_tests import held_out_gains
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.choice import fitted_beside, fitted_with, objection
-from scara_ident.diagnosis.moments import moments_told
-from scara_ident.diagnosis.noise_check import noise_left
+from scara_ident.diagnosis.same_errors import same
 from scara_ident.diagnosis.selection_step import SelectionStep, best_of_each
 from scara_ident.effects import Scene
 
@@ -115,20 +114,6 @@ def near_in_place(step: SelectionStep, found: Decision, pool: Sequence[Candidate
     alike = [item for item in pool if item.effect.name == effect.name]
     others = enough([item for item in pool if item.effect.name != effect.name], first, LEAST_AT_FIRST * least)
     return list(best_of_each(step.judge(enough([*alike, *others], step.scene, least))).values())
-
-
-def same(own: tuple[SelectionStep, Decision], other: tuple[SelectionStep, Decision]) -> bool:
-    """Whether the errors of two models, each a candidate beside a step, differ by no more than chance or noise makes.
-
-    What either lacks is the same in every repetition of a motion: these count as one.
-    """
-    worse = np.bincount(moments_told(own[0])[2], other[1].examination.left - own[1].examination.left)
-    difference, least = float(np.sum(worse)), own[0].criteria.alike * float(np.sqrt(len(worse) * np.var(worse)))
-    if abs(difference) < least:
-        return True
-    # The noise of the positions is in the columns of one more than in those of the other.
-    grown, own_grown = (noise_left(step, decision.candidate) for step, decision in (other, own))
-    return abs(difference - grown + own_grown) < least
 
 
 def _fitted_rivals(

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.diagnosis.effect_parameters import LinearParameters, PhysicalParameters, physical_parameters
-from scara_ident.diagnosis.exchange import same
 from scara_ident.diagnosis.nonlinear_fit import tune
 from scara_ident.diagnosis.other_minima import as_good, widened
+from scara_ident.diagnosis.same_errors import same
 from scara_ident.diagnosis.selection_step import SelectionStep
 
 

@@ -14,10 +14,10 @@ import numpy as np
 
 from scara_ident.diagnosis.candidates import Candidate, columns_at_hand
 from scara_ident.diagnosis.effect_parameters import physical_parameters
-from scara_ident.diagnosis.exchange import same
 from scara_ident.diagnosis.linearised import linearise
 from scara_ident.diagnosis.nonlinear_fit import LEAST_FALL, RISE, tune
 from scara_ident.diagnosis.part_of_recordings import on_all, on_part
+from scara_ident.diagnosis.same_errors import same
 from scara_ident.diagnosis.selection_step import SelectionStep
 from scara_ident.effects import Parameter
 from scara_ident.errors import RecordingError

@@ -9,9 +9,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from scara_ident.diagnosis.candidates import Candidate
+from scara_ident.diagnosis.candidates import Candidate, CandidateColumns
 from scara_ident.diagnosis.choice import (
     _each_fitted,
+    _intervals_last,
     _least_left,
     _left_again,
     _sure_once_refined,
@@ -22,14 +23,17 @@ from scara_ident.diagnosis.choice import (
 from scara_ident.diagnosis.correction import Correction
 from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.nonlinear_fit import tune
-from scara_ident.diagnosis.selection_step import moved_together
-from scara_ident.effects import Member
+from scara_ident.diagnosis.selection_step import SelectionStep, moved_together
+from scara_ident.effects import Interval, Member
 from scara_ident.effects.elasticity import JointElasticity
 from scara_ident.effects.friction import Stribeck
 from scara_ident.effects.measurement import TimeDelay, shifted
+from scara_ident.effects.payload import PayloadChange
+from scara_ident.effects.payload_intervals import PayloadInIntervals
 from scara_ident.effects.position import Spring
 from scara_ident.simulation import parse_effect, simulate, virtual_arm
 from tests.diagnosis.made import NOISE, exact_runs, multisine, step_beside, with_torque
+from tests.effects.intervals import SECONDS, arms, runs, seen
 
 
 def test_what_is_sure_only_beside_its_grid_point_is_refined_before_it_is_refused():
@@ -127,6 +131,20 @@ def test_of_the_same_effects_the_fit_that_leaves_least_is_taken_whatever_the_las
 
     wrong, right, other = fit("a2", "a1", 90.0, 0.9), fit("a1", "a2", 20.0, 0.3), fit("a3", "a1", 50.0, 0.8)
     assert _least_left([wrong, other, right]) == [right, other]
+
+
+@pytest.mark.parametrize(("last", "plain"), [(4.0, True), (6.3, False)])
+def test_what_all_runs_take_up_at_one_time_is_no_list_of_intervals(last: float, plain: bool, tmp_path):
+    """Their ends, told by all rows, do a little better on those held out than one instant (gallery: 6 intervals for one)."""
+    robots, starts = arms(tmp_path), (4.0, 4.0, last)
+    scene, observations = seen(robots[0], runs(robots, {f"m{k}_1": ((t, SECONDS),) for k, t in enumerate(starts)}))
+    step = SelectionStep(scene, CandidateColumns(observations), (), np.full(2, 20.0), 10, CRITERIA)
+    intervals = tuple(Interval(k, t, SECONDS) for k, t in enumerate(starts))
+    asked = [(PayloadInIntervals(), Member(None, intervals=intervals)), (PayloadChange(), Member(None, (4.0,)))]
+    within, once, spring = step.judge([*(Candidate(*item) for item in asked), Candidate(Spring(), Member(0))])
+    order = [(step, spring), (step, within), (step, once)]
+    assert _intervals_last(order) == ([order[0], order[2], order[1]] if plain else order)
+    assert _intervals_last([(step, once), (step, within)]) == [(step, once), (step, within)]
 
 
 @pytest.mark.parametrize(("left", "there"), [(0.02, True), (0.96, False)])

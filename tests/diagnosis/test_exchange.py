@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from scara_ident.diagnosis.candidates import Candidate
-from scara_ident.diagnosis.exchange import best_exchange, near_in_place, needed, same
+from scara_ident.diagnosis.exchange import best_exchange, near_in_place, needed
+from scara_ident.diagnosis.same_errors import same
 from scara_ident.effects import Member
 from scara_ident.effects.friction import AsymmetricFriction, Stribeck
 from scara_ident.effects.measurement import TimeDelay

@@ -40,7 +40,7 @@ def test_the_pictures_are_small():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["stribeck", "transmission_loss"])
+@pytest.mark.parametrize("name", ["stribeck", "transmission_loss", "payload_change"])
 def test_what_the_page_says_was_found_is_what_the_program_finds_today(name: str):
     robot, runs, hidden = gallery.recordings(name)
     effect = next(found for found in diagnose(robot, runs).effects if found.effect == name)
