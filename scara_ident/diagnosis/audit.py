@@ -20,7 +20,7 @@ from scara_ident.diagnosis.search import Search
 from scara_ident.diagnosis.selection_step import SelectionStep, best_of_each
 from scara_ident.diagnosis.variation_check import variation_objection
 from scara_ident.effects import Parameter
-from scara_ident.estimation.noise_bias import NEGLIGIBLE, noise_shares
+from scara_ident.estimation.noise_bias import noisy
 from scara_ident.estimation.run_variation import LEAST_RUNS
 
 
@@ -39,8 +39,8 @@ def unsettled(found: Search, weights: Array) -> list[Decision]:
         return []
     # Whether runs that differ make it is asked of it alone, on rows that weigh them as noise.
     coefficients = physical_parameters(step, of_runs=False, of_noise=False).coefficients
-    noisy = max(noise_shares(step.observations.data), default=0.0) >= NEGLIGIBLE
-    free = [noisy and bool(item.effect.nonlinear) and not item.effect.together for item in step.chosen]
+    noise = noisy(step.observations.data)
+    free = [noise and bool(item.effect.nonlinear) and not item.effect.together for item in step.chosen]
     moved = physical_parameters(step, of_runs=False).coefficients if any(free) else coefficients
     # One of several that act together may mend what another lacks: then scatter alone does not say how unsure it is.
     sizes = physical_parameters(step).effects if len(step.scene.together) > 1 else ()

@@ -19,7 +19,7 @@ from scara_ident.diagnosis.unknowns import sides
 from scara_ident.effects import Effect, Parameter, Scene
 from scara_ident.estimation.covariance import Covariance, block_covariance
 from scara_ident.estimation.information import merge
-from scara_ident.estimation.noise_bias import NEGLIGIBLE, noise_shares
+from scara_ident.estimation.noise_bias import OF_LAG, noisy
 from scara_ident.estimation.run_offsets import beside_offsets
 from scara_ident.estimation.run_variation import LEAST_RUNS
 from scara_ident.estimation.variation_between import run_variation
@@ -278,10 +278,10 @@ def _told_directions(step: SelectionStep, state: Linearised) -> Told | None:
 
 def _noise_bias(step: SelectionStep, state: Linearised) -> Array | None:
     """Return by how much the noise of positions moves all parameters of a fit, see `scara_ident.estimation.noise_bias`."""
-    if max(noise_shares(step.observations.data), default=0.0) < NEGLIGIBLE:
+    tied = any(item.effect.tie(step.scene, item.member) is not None for item in step.chosen)
+    if not noisy(step.observations.data, OF_LAG if tied else 0):
         return None
     # A resonance with little damping bends too much for one step.
-    tied = any(item.effect.tie(step.scene, item.member) is not None for item in step.chosen)
     noisier = tune(step.noisier) if tied else step.noisier
     again = with_estimate_slopes(noisier, linearise(noisier))
     bias = again.solve()[0] - state.solve()[0]

@@ -15,7 +15,7 @@ from scara_ident.diagnosis.cluster_test import significance
 from scara_ident.diagnosis.selection_step import SelectionStep
 from scara_ident.effects import Scene
 from scara_ident.errors import RecordingError
-from scara_ident.estimation.noise_bias import NEGLIGIBLE, noise_shares
+from scara_ident.estimation.noise_bias import noisy
 from scara_ident.estimation.run_offsets import offsets_on
 from scara_ident.motion.position_noise import noise_sizes
 
@@ -192,7 +192,7 @@ def less_noise(step: SelectionStep, decisions: Sequence[Decision], scene: Scene 
     scene : Scene, optional
         By whose columns they are judged; default: the step's.
     """
-    if not decisions or max(noise_shares(step.observations.data), default=0.0) < NEGLIGIBLE:
+    if not decisions or not noisy(step.observations.data):
         return list(decisions)
     judged, result = step.judge([item.candidate for item in decisions], scene), []
     for item, now, left in zip(decisions, judged, _each_without_noise(step, judged, scene), strict=True):

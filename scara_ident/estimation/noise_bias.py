@@ -18,12 +18,15 @@ from scara_ident.estimation.information import Information, merge, weighted
 from scara_ident.estimation.observations import Observations, informations
 from scara_ident.estimation.sample_columns import few_enough
 from scara_ident.manners import listed
+from scara_ident.motion.low_pass import differentiate
 from scara_ident.motion.position_noise import NoiseSizes, forget_stepless, noise_sizes, noisier
 from scara_ident.motion.prepared import PreparedData, PreparedRecording
 from scara_ident.threads import side_by_side
 
 # Share of an acceleration's square that is noise within the band: less biases an inertia by less than a hundredth of a percent.
 NEGLIGIBLE = 1e-4
+# What lags by the torque behind a gear has two derivatives more than the torque, and noise above slow motion accordingly.
+OF_LAG = 2
 # Standard deviations by which the noise moves a parameter before that is said.
 SPOKEN_OF = 1.0
 
@@ -41,7 +44,7 @@ def noise_bias(observations: Observations, weights: Array, value: Array | None) 
     value : ndarray, shape (p,), or None
         Least squares with them, where it is known.
     """
-    if max(noise_shares(observations.data), default=0.0) < NEGLIGIBLE:
+    if not noisy(observations.data):
         return None
     here = observations.in_memory
     # The bias follows from the motion: a repetition has the same, and adds to what is known of it chance alone.
@@ -111,11 +114,23 @@ def _noise_torque(observations: Observations, value: Array) -> Array:
     return result
 
 
-def noise_shares(data: PreparedData) -> list[float]:
+def noisy(data: PreparedData, derivatives: int = 0) -> bool:
+    """Whether the noise of positions is more than negligible in accelerations, or in further derivatives of them."""
+    return max(noise_shares(data, derivatives), default=0.0) >= NEGLIGIBLE
+
+
+def noise_shares(data: PreparedData, derivatives: int = 0) -> list[float]:
     """Return for every moving joint of every recording the share of its acceleration's square that is noise.
 
-    White position noise of variance s^2 at a rate r has the acceleration ``2 s^2 / r (2 pi)^4 f^5 / 5`` up to f.
+    White position noise of variance s^2 at a rate r has the acceleration ``2 s^2 / r (2 pi)^4 f^5 / 5`` up to f, and its k-th
+    derivative ``2 s^2 / r (2 pi)^(4 + 2 k) f^(5 + 2 k) / (5 + 2 k)``.
+
+    Parameters
+    ----------
+    derivatives : int, optional
+        How often the acceleration is differentiated further, at most twice.
     """
+    order = 2 + derivatives
 
     def of_recording(item: PreparedRecording, each: tuple[NoiseSizes, ...]) -> list[float]:
         part = item.longest
@@ -125,8 +140,11 @@ def noise_shares(data: PreparedData) -> list[float]:
                 continue
             step, level = sizes[joint]
             noise = level**2 + (0.0 if step is None else step**2 / 12.0)
-            power = 2.0 * noise / part.rate * (2.0 * np.pi) ** 4 * band**5 / 5.0
-            whole = float(np.mean(part.motion.a[joint][part.used[joint]] ** 2))
+            power = 2.0 * noise / part.rate * (2.0 * np.pi * band) ** (2 * order) * band / (2.0 * order + 1.0)
+            motion = part.motion.a[joint]
+            if derivatives:
+                motion = differentiate(motion, part.rate, band)[derivatives]
+            whole = float(np.mean(motion[part.used[joint]] ** 2))
             found.append(power / whole if whole > 0.0 else 0.0)
         return found
 

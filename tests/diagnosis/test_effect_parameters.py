@@ -24,6 +24,7 @@ from scara_ident.diagnosis.search import scene_of as scene_at
 from scara_ident.diagnosis.selection_step import SelectionStep
 from scara_ident.effects import Member, Parameter
 from scara_ident.effects.coupling import DriveCoupling
+from scara_ident.effects.elasticity import JointElasticity
 from scara_ident.effects.friction import Stribeck
 from scara_ident.effects.gear import TransmissionLoss
 from scara_ident.effects.measurement import TimeDelay
@@ -171,6 +172,20 @@ def test_the_deviation_of_a_coefficient_holds_what_the_noise_of_positions_does()
     bias = share(step.noisier) - share(step)
     assert abs(bias) > scatter["share"].std
     assert whole["share"].std == pytest.approx(np.hypot(scatter["share"].std, bias), rel=1e-3)
+
+
+def test_what_lags_has_noise_where_accelerations_have_next_to_none() -> None:
+    """Steps of 20 bits bias no inertia, and a fit of an elastic gear was told as if there were none."""
+    step = 2.0 * np.pi / 2**20
+    fine = exact_runs()
+    coarse = [replace(run, position=step * np.round(run.position / step)) for run in fine]
+    told = []
+    for runs, effect in ((coarse, JointElasticity()), (coarse, Spring()), (fine, JointElasticity())):
+        begun = Member(0, (25.0, 0.1)) if effect.nonlinear else Member(0)
+        linear = physical_parameters(step_beside(runs, [Candidate(effect, begun)], WEIGHTS)).linear
+        assert linear is not None
+        told.append(linear.noise_bias is not None)
+    assert told == [True, False, False]
 
 
 def test_coefficients_are_at_least_what_their_uncertainty_leaves():

@@ -9,8 +9,17 @@ import pytest
 
 from scara_ident.estimation import sample_columns, wls
 from scara_ident.estimation.information import weighted
-from scara_ident.estimation.noise_bias import bias_sentence, noise_bias, noise_shares, noise_torque
+from scara_ident.estimation.noise_bias import (
+    NEGLIGIBLE,
+    OF_LAG,
+    bias_sentence,
+    noise_bias,
+    noise_shares,
+    noise_torque,
+    noisy,
+)
 from scara_ident.estimation.observations import informations
+from scara_ident.motion.low_pass import differentiate
 from scara_ident.motion.position_noise import STEPLESS, noisier
 from scara_ident.motion.prepared import prepare
 from tests.diagnosis.made import exact_runs, observed
@@ -57,14 +66,25 @@ def test_the_share_of_noise_is_that_of_white_steps():
     assert noise_shares(data)[0] == pytest.approx(expected, rel=0.3)
 
 
+def test_the_share_in_what_lags_is_that_of_two_derivatives_more():
+    """Steps that make next to nothing of an acceleration make much of how it bends, which a lag behind a gear follows."""
+    fine, rough = (prepare(runs, WIDE) for runs in (exact_runs(), coarse(20)))
+    found, part = noise_shares(rough, OF_LAG)[0], rough.stretches[0]
+    motions = (data.stretches[0].motion.a[0] for data in (fine, rough))
+    bent = [differentiate(a, part.rate, WIDE[0])[2][part.used[0]] for a in motions]
+    assert found == pytest.approx(np.mean((bent[1] - bent[0]) ** 2) / np.mean(bent[1] ** 2), rel=0.3)
+    assert noise_shares(rough)[0] < NEGLIGIBLE < found
+    assert noisy(rough, OF_LAG) and not noisy(rough) and not noisy(fine, OF_LAG)
+
+
 def test_what_scatters_over_the_steps_is_counted_too():
     """Positions of 16 bits with a noise of five steps: the bias that it makes was not seen, and no part of a std."""
     step, rng = 2.0 * np.pi / 2**16, np.random.default_rng(5)
-    noisy = [
+    scattered = [
         replace(run, position=step * np.round(run.position / step + 5.0 * rng.standard_normal(run.position.shape)))
         for run in exact_runs()
     ]
-    estimate, exact = wls(observed(noisy, WIDE)), wls(observed(exact_runs(), WIDE)).value
+    estimate, exact = wls(observed(scattered, WIDE)), wls(observed(exact_runs(), WIDE)).value
     assert estimate.noise_bias is not None
     assert estimate.noise_bias[0] == pytest.approx(estimate.value[0] - exact[0], rel=0.3)
 
