@@ -21,7 +21,7 @@ from scara_ident.diagnosis.same_errors import same
 from scara_ident.diagnosis.selection_step import SelectionStep
 from scara_ident.effects import Parameter
 from scara_ident.errors import RecordingError
-from scara_ident.estimation.noise_bias import OF_LAG, noisy
+from scara_ident.estimation.noise_bias import noisy
 from scara_ident.estimation.run_offsets import offsets_on
 
 # A fit that leaves so many times as much is no rival, whatever rows will weigh in the end.
@@ -152,7 +152,7 @@ def _alike(step: SelectionStep, other: SelectionStep, places: Sequence[int]) -> 
 
 def _below(step: SelectionStep) -> SelectionStep | None:
     """Return the fit in the lower part of the band; None where recordings are too short for that or positions have no noise."""
-    if not noisy(step.observations.data, OF_LAG):
+    if not noisy(step.observations.data):
         return None
     # Half-way to it, by octaves, as of a fast resonance little is in so low a part.
     share = float(np.sqrt(step.criteria.lower_band))
