@@ -29,8 +29,10 @@ BINS_PER_OCTAVE = 3
 SEGMENT_SECONDS = 4.0
 # Samples whose segments are transformed together: of more the memory leaves the cache, of fewer the calls take longer.
 AT_ONCE = 8192
-# Samples that are looked at, at the most, at each rate.
+# Samples that are looked at, at the most, at each rate; and up to which repetitions are, which tell no more of a motion and only
+# average noise.
 ENOUGH_SAMPLES = 20_000
+ENOUGH_WITH_REPETITIONS = 10_000
 
 
 @dataclass(frozen=True)
@@ -70,9 +72,12 @@ class Spectra:
             fade = moving_weight(slow.rest, slow.rate, slow.bands)
             return fade, moving_power(torque_of(part), fade, part.rate, edges)
 
-        # Of a single recording too both threads have work; the columns take longer.
-        works = [wide] * len(slow) + [recorded] * len(slow)
-        made = side_by_side(lambda work, *parts: work(*parts), works, 2 * self.parts, 2 * list(slow))
+        if len(slow) == 1:
+            # Its joints and its samples are what two threads share.
+            made = [wide(self.parts[0], slow[0]), recorded(self.parts[0], slow[0])]
+        else:
+            works = [wide] * len(slow) + [recorded] * len(slow)
+            made = side_by_side(lambda work, *parts: work(*parts), works, 2 * self.parts, 2 * list(slow))
         self.columns = made[: len(slow)]
         self.fades = [fade for fade, _ in made[len(slow) :]]
         self.torque = np.sum([power for _, power in made[len(slow) :]], axis=0)
@@ -142,7 +147,7 @@ def thinned_to(data: PreparedData, rate: float) -> PreparedData:
 
 
 def sample(data: PreparedData) -> PreparedData:
-    """Take one repetition of each trajectory, then more, until there is enough to look at."""
+    """Take one repetition of each trajectory, then more where these are few, until there is enough to look at."""
     seen: dict[str, int] = {}
     ranked = []
     for place, label in enumerate(data.labels):
@@ -151,9 +156,9 @@ def sample(data: PreparedData) -> PreparedData:
         ranked.append((turn, place))
     chosen: list[int] = []
     total = 0
-    for _, place in sorted(ranked):
+    for turn, place in sorted(ranked):
         count = sum(part.samples for part in data.recordings[place].stretches)
-        if chosen and total + count > ENOUGH_SAMPLES:
+        if chosen and total + count > (ENOUGH_WITH_REPETITIONS if turn else ENOUGH_SAMPLES):
             continue
         chosen.append(place)
         total += count

@@ -164,15 +164,16 @@ class Information(Frozen):
         r = self.regressor_factor
         size = np.linalg.norm(r, axis=0)
         entering = size > 0.0
-        if np.all(entering):
-            known = _surely_determined(r / size, self.projected_torque)
-            if known is not None:
-                nothing = np.zeros(self.parameters, dtype=bool)
-                return Solution(known / size, nothing, np.zeros((self.parameters, 0)))
         value = np.zeros(self.parameters)
         undetermined = ~entering
         null = np.eye(self.parameters)[:, ~entering]
-        if np.any(entering):
+        # Without columns that are zero it is triangular no more.
+        rows = self.factor if np.all(entering) else triangular(self.factor[:, np.append(entering, True)])
+        count = np.count_nonzero(entering)
+        known = _surely_determined(rows[:count, :-1] / size[entering], rows[:count, -1])
+        if known is not None:
+            value[entering] = known / size[entering]
+        elif np.any(entering):
             scaled = r[:, entering] / size[entering]
             left, singular, right = np.linalg.svd(scaled)
             rank = int(np.count_nonzero(singular > UNDETERMINED * singular[0]))

@@ -58,11 +58,11 @@ def _left(model: TorqueModel, joints: Sequence[Information], value: Array, noise
 def without(information: Information, column: int) -> Information:
     """Return what rows say of all else with a parameter of their own, which is zero then."""
     factor = information.factor
-    if not np.any(factor[:, column]):
+    size = np.linalg.norm(factor[:, column])
+    if size == 0.0:
         return information
-    others = np.delete(np.arange(factor.shape[1]), column)
-    # The parameter first: what is below its row does not know it.
-    turned = triangular(factor[:, [column, *others]])[1:, 1:]
-    rows = np.zeros((len(turned), factor.shape[1]))
-    rows[:, others] = turned
+    # What is along its column says nothing but of it; nothing of the column itself is left.
+    along = factor[:, column] / size
+    rows = factor - np.outer(along, along @ factor)
+    rows[:, column] = 0.0
     return Information(triangular(rows), information.rows)

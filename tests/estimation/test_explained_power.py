@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
-from scara_ident.estimation.explained_power import binned_power
+from scara_ident.estimation.explained_power import binned_power, sample
+from scara_ident.motion.prepared import PreparedData, prepare
+from scara_ident.recording.recording import Recording
 
 RATE = 500.0
 
@@ -29,3 +32,33 @@ def test_binned_power_is_the_same_however_the_signals_lie_in_memory():
     np.testing.assert_array_equal(
         binned_power(np.asfortranarray(signals), RATE, edges), binned_power(signals, RATE, edges)
     )
+
+
+def runs(trajectories: int, repetitions: int, samples: int) -> PreparedData:
+    """Return repetitions of some trajectories in turn: all of the first, then all of the second."""
+    random = np.random.default_rng(0)
+    time = np.arange(samples) / 100.0
+    made = []
+    for trajectory in range(trajectories):
+        wave = np.sum([np.sin(f * time + random.uniform(0.0, 6.0)) for f in random.uniform(0.5, 3.0, 5)], axis=0)
+        for repetition in range(1, repetitions + 1):
+            position = (wave + 1e-5 * random.standard_normal(samples))[None]
+            name = f"T{trajectory}"
+            made.append(Recording(f"{name}_{repetition}", name, repetition, ("joint",), time, position, position))
+    return prepare(made)
+
+
+@pytest.mark.parametrize(
+    ("trajectories", "repetitions", "samples", "names"),
+    [
+        (2, 3, 2000, ["T0_1", "T1_1", "T0_2", "T1_2", "T0_3"]),
+        (3, 2, 4000, ["T0_1", "T1_1", "T2_1"]),
+        (6, 1, 4000, ["T0_1", "T1_1", "T2_1", "T3_1", "T4_1"]),
+        (1, 2, 30_000, ["T0_1"]),
+    ],
+)
+def test_repetitions_are_looked_at_only_where_trajectories_are_few(
+    trajectories: int, repetitions: int, samples: int, names: list[str]
+):
+    chosen = sample(runs(trajectories, repetitions, samples))
+    assert [item.name for item in chosen.recordings] == names
