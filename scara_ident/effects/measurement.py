@@ -105,7 +105,7 @@ class TorqueGainMismatch(Effect):
     """
 
     name = "torque_gain_mismatch"
-    summary = "a torque scale that differs from the first joint's"
+    summary = "a torque scale of its own, given over the first joint's"
     coefficients = (
         Coefficient("ratio_less_one", "1", "torque scale of {joint} over that of the joints that agree, less 1"),
     )
@@ -115,11 +115,11 @@ class TorqueGainMismatch(Effect):
     experiment = "repeat with a known payload: it gives all joints the same scale"
 
     def description(self, scene: Scene, member: Member) -> str:
-        """Say whose scale that of the first joint differs from."""
+        """Say over whose scale it is given: two joints that both differ from the others may have the same."""
         first = _compared(scene, member)[0]
         if member.joint == first:
-            return "a torque scale that differs from that of the joints not named"
-        return f"a torque scale that differs from that of {scene.robot.joints[first]}" if first else self.summary
+            return "a torque scale of its own, given over that of the joints not named"
+        return f"a torque scale of its own, given over that of {scene.robot.joints[first]}" if first else self.summary
 
     def joints(self, scene: Scene) -> list[int]:
         """Return all joints whose scale another's tells; of two the second, as either explains what the other does."""
