@@ -38,7 +38,7 @@ class TransmissionLoss(Effect):
     the coefficient when it is refined, so that no gain of this joint's torque is left over.
 
     A load that swings fast about a small one loses the mean of its size, which is not the size of its mean: what the recorded torque
-    has beyond the low-pass of the positions is in the first term, see `swinging_load`, and without a torque is left out.
+    has beyond the low-pass of the positions is in the first term; without a torque it is left out.
     Hamon, Gautier, Garrec (2011), "New dry friction model with load- and velocity-dependence".
     """
 
