@@ -9,11 +9,24 @@ import numpy as np
 from scara_ident.arrays import Array
 from scara_ident.effects.effect import Effect
 from scara_ident.effects.following import EstimateSlopes, predicted_slopes, some_slopes
+from scara_ident.effects.links import usual_link_inertia
 from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, View
 from scara_ident.effects.signals import Scene, Signals
 
 # A gear that loses more of the torque is broken.
 LARGEST_LOSS_SHARE = 0.75
+
+
+def swinging_load(signals: Signals, joint: int) -> Array:
+    """Return the torque that the gear of a joint transmits, with what it swings by beyond the filtered motion, shape (N,).
+
+    Of a torque that swings so fast a gear passes on the link's share of the inertia, the rotor takes up its own.
+    """
+    load, swing = signals.load(joint), signals.swing(joint)
+    if not np.any(swing):
+        return load
+    link, rotor = max(usual_link_inertia(signals.scene, joint), 0.0), max(signals.scene.armature(joint), 0.0)
+    return load + (link / (link + rotor) if link > 0.0 else 0.0) * swing
 
 
 class TransmissionLoss(Effect):
@@ -23,6 +36,9 @@ class TransmissionLoss(Effect):
     ``sqrt(1 + c^2) tau_l + c |tau_l| sign(v)`` with ``eta = sqrt(1 + c^2) - c`` and the transmitted torque tau_l, which
     leaves out the own rotor's inertia. The first term is of second order; its c is a nonlinear parameter that meets
     the coefficient when it is refined, so that no gain of this joint's torque is left over.
+
+    A load that swings fast about a small one loses the mean of its size, which is not the size of its mean: what the recorded torque
+    has beyond the low-pass of the positions is in the first term; without a torque it is left out.
     Hamon, Gautier, Garrec (2011), "New dry friction model with load- and velocity-dependence".
     """
 
@@ -51,8 +67,8 @@ class TransmissionLoss(Effect):
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
         """Return ``|tau_l| sign(v)`` with its share of the second-order term."""
         j, share = member.place, member.nonlinear[0]
-        load = signals.load(j)
-        return [np.abs(load) * signals.sign[j] + (np.sqrt(1.0 + share**2) - 1.0) / share * load]
+        size = np.abs(swinging_load(signals, j))
+        return [size * signals.sign[j] + (np.sqrt(1.0 + share**2) - 1.0) / share * signals.load(j)]
 
     def estimate_slopes(self, signals: Signals, member: Member, value: Array) -> EstimateSlopes:
         """Return those by the rigid bodies, which load the gear but for the own rotor; what else acts on links is held."""
@@ -61,7 +77,7 @@ class TransmissionLoss(Effect):
         bodies = np.arange(place.start, place.stop)
         places, rows = some_slopes(predicted_slopes(signals, j), bodies)
         rotor = scene.armature_slopes(j)[places - place.start, None] * scene.robot.row_scale[j] * signals.motion.a[j]
-        along = np.sign(signals.load(j)) * signals.sign[j] + (np.sqrt(1.0 + share**2) - 1.0) / share
+        along = np.sign(swinging_load(signals, j)) * signals.sign[j] + (np.sqrt(1.0 + share**2) - 1.0) / share
         return {j: (places, value[0] * along * (rows - rotor))}
 
     def geared_joint(self, member: Member) -> int:

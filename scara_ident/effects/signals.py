@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.model.model import TorqueModel
+from scara_ident.motion.low_pass import low_pass
 from scara_ident.motion.motion import Motion
 from scara_ident.robot.robot import Robot
 
@@ -143,7 +144,7 @@ class Signals:
     def at(self, scene: Scene) -> Signals:
         """Return the signals at another estimate of the same base model; what does not follow from it is shared."""
         same = scene.value is self.scene.value
-        kept = ["time", "sign", "columns", "motor_turns", *(("predicted", "rigid") if same else ())]
+        kept = ["time", "sign", "columns", "motor_turns", "_swings", *(("predicted", "rigid") if same else ())]
         if same and scene.link_torques is self.scene.link_torques:
             kept.append("on_links")
         return Signals(scene, self.motion).with_made(**{k: self.__dict__[k] for k in kept if k in self.__dict__})
@@ -208,6 +209,23 @@ class Signals:
 
     @cached_property
     def _loads(self) -> dict[int, Array]:
+        return {}
+
+    def swing(self, joint: int) -> Array:
+        """Recorded torque of a joint beyond the low-pass of its position, shape (N,); zero where no torque or no such is known.
+
+        What a controller answers the steps of an encoder with moves the arm too, faster than the filtered motion says.
+        """
+        torque, cuts = self.motion.torque, self.motion.cuts
+        cut = cuts[joint] if cuts else None
+        if torque is None or cut is None:
+            return np.zeros(self.motion.samples)
+        if joint not in self._swings:
+            self._swings[joint] = torque[joint] - low_pass(torque[joint], self.motion.rate, cut)
+        return self._swings[joint]
+
+    @cached_property
+    def _swings(self) -> dict[int, Array]:
         return {}
 
     @cached_property

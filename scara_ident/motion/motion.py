@@ -43,6 +43,8 @@ class Motion(Frozen):
     fade : ndarray, shape (n, N), or None
         Weight of every sample of each joint's torque, 0 where the joint stands still and friction is unknown, see `fading`;
         None where nothing is said of it.
+    cuts : tuple of float or None, one per joint
+        Low-pass that its positions passed, Hz; empty where none did.
     """
 
     name: str
@@ -54,6 +56,7 @@ class Motion(Frozen):
     torque: Array | None
     rate: float
     fade: Array | None = None
+    cuts: tuple[float | None, ...] = ()
     # A copy of other positions has no such.
     _same: Motion | None = field(default=None, init=False, repr=False)
 
@@ -86,6 +89,7 @@ class Motion(Frozen):
             None if self.torque is None else self.torque[:, window],
             self.rate,
             None if self.fade is None else self.fade[:, window],
+            self.cuts,
         )
 
 
@@ -266,7 +270,8 @@ def motion_of(stretch: Stretch, cuts: Sequence[float | None]) -> Motion:
     q, v, a = (np.array([part[k] for part in parts]) for k in range(3))
     # What is held of them is this, once.
     stretch._filtered.update(zip(wanted.items(), zip(q, v, a, strict=True), strict=True))
-    return Motion(stretch.name, stretch.trajectory, stretch.time, q, v, a, stretch.torque, stretch.rate)
+    found = Motion(stretch.name, stretch.trajectory, stretch.time, q, v, a, stretch.torque, stretch.rate)
+    return replace(found, cuts=tuple(cuts))
 
 
 def thinned(stretch: Stretch, step: int) -> Stretch:

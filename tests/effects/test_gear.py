@@ -8,14 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scara_ident.effects import Member
-from scara_ident.effects.gear import TransmissionLoss
+from scara_ident.effects import Member, Scene, Signals
+from scara_ident.effects.gear import TransmissionLoss, swinging_load
 from scara_ident.effects.payload import PayloadChange
 from scara_ident.effects.position import Spring
 from scara_ident.effects.signals import LinkTorque
+from scara_ident.motion.low_pass import differentiate, low_pass
+from scara_ident.motion.motion import Motion
 from scara_ident.robot.robot import load_robot
+from scara_ident.simulation import SimulationResult, simulate, virtual_arm
 from scara_ident.simulation import effects as fx
-from scara_ident.simulation import simulate
 from tests.effects.carried import ALWAYS
 from tests.effects.scenes import columns, scene_of
 from tests.effects.simulated import ARMS, arm_of, run, true_motion, true_scene
@@ -63,6 +65,52 @@ def test_beside_what_acts_on_links_it_is_what_the_simulated_gear_loses_of_all_to
     alone = replace(scene, link_torques=())
     missing = SHARE * columns(TransmissionLoss(), alone, item, Member(0, (SHARE,)))[:, 0] + added - left
     assert np.abs(missing[0])[seen[0]].max() > 1e-3 * float(arm.torque_scale[0])
+
+
+def behind_coarse_encoders(bits: int) -> tuple[SimulationResult, Scene, Motion]:
+    """A swing under a controller that answers the steps of encoders of so many bits, as it is seen in a band of 6 Hz."""
+    arm = virtual_arm()
+    steps = np.full(2, 2.0**bits) / np.abs(arm.robot.reduction)
+    arm, slow = replace(arm, encoder_steps=steps, torque_noise=np.zeros(2)), swing(arm.robot, amplitude=0.2)
+    result = simulate(arm, slow, effects=[fx.TransmissionLoss(arm.robot.joints[0], SHARE)], rate=500.0)
+    # The motion of the positions without steps, so that what these do to it is no part of what is compared.
+    t, cut = result.true, 18.0
+    smooth = differentiate(t.position, 500.0, cut)
+    motion = Motion("m", "m", result.recording.time, *smooth, result.recording.effort, 500.0, None, (cut, cut))
+    return result, replace(true_scene(result), armatures=dict(enumerate(arm.armature.tolist()))), motion
+
+
+def test_what_a_load_loses_that_swings_faster_than_the_filtered_motion_is_in_the_column():
+    result, scene, motion = behind_coarse_encoders(13)
+    member, inside = Member(0, (SHARE,)), slice(100, -100)
+    scale = float(scene.robot.row_scale[0])
+    load, direction = scale * result.true.load[0], result.true.direction[0]
+    # What Hamon's law has of the torque that the simulated gear transmits.
+    truly = np.abs(load) * direction + (np.sqrt(1.0 + SHARE**2) - 1.0) / SHARE * load
+
+    def missed(item: Motion) -> float:
+        found = columns(TransmissionLoss(), scene, item, member)[0, 0]
+        return float(np.std(low_pass(found - truly, 500.0, 6.0)[inside]))
+
+    whole = float(np.std(low_pass(truly, 500.0, 6.0)[inside]))
+    assert missed(motion.with_torque(None)) > 0.2 * whole
+    # The recorded torque is a mean over the controller's period, which takes off the fastest of a swing.
+    assert missed(motion) < 0.6 * missed(motion.with_torque(None))
+
+
+def test_a_gear_transmits_the_links_share_of_a_torque_that_swings_and_nothing_without_a_torque():
+    result, scene, motion = behind_coarse_encoders(13)
+    signals = Signals(scene, motion)
+    part = swinging_load(signals, 0) - signals.load(0)
+    share = part @ signals.swing(0) / (signals.swing(0) @ signals.swing(0))
+    assert part == pytest.approx(share * signals.swing(0), abs=1e-12)
+    beyond = [
+        x - low_pass(x, 500.0, 18.0) for x in (scene.robot.row_scale[0] * result.true.load[0], result.true.effort[0])
+    ]
+    # Other joints swing too, and poses have other inertias than the mean.
+    assert share == pytest.approx(beyond[0] @ beyond[1] / (beyond[1] @ beyond[1]), rel=0.25)
+    for other in (motion.with_torque(None), replace(motion, cuts=()), replace(motion, cuts=(None, None))):
+        assert np.array_equal(swinging_load(Signals(scene, other), 0), Signals(scene, other).load(0))
 
 
 def test_what_no_gear_can_have_is_refused():

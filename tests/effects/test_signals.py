@@ -43,6 +43,17 @@ def test_the_load_is_the_rigid_torque_without_the_own_rotor():
     assert friction == pytest.approx(0.02 * (np.sign(v) * (1.0 + v**2) + v + v**3 + 1.0), abs=1e-12)
 
 
+def test_a_torque_swings_by_what_is_beyond_the_low_pass_of_the_positions():
+    robot = load_robot()
+    item = moving(robot, 4.0)
+    slow, fast = (np.outer([1.0, 2.0], np.sin(2.0 * np.pi * f * item.time)) for f in (2.0, 100.0))
+    signals = Signals(scene_of(robot), replace(item, cuts=(15.0, None)).with_torque(slow + fast))
+    assert np.max(np.abs(signals.swing(0) - fast[0])[100:-100]) < 1e-3
+    assert np.array_equal(signals.swing(1), np.zeros(item.samples))
+    assert signals.at(scene_of(robot, 1.1 * signals.scene.value)).swing(0) is signals.swing(0)
+    assert np.array_equal(Signals(scene_of(robot), item).swing(0), np.zeros(item.samples))
+
+
 def test_an_armature_is_what_the_model_tells_else_what_an_effect_told_else_nominal():
     scene = scene_of(load_robot())
     nominal = scene.robot.reduction**2 * scene.robot.rotor_inertia

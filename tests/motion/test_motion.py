@@ -91,6 +91,7 @@ def test_each_joint_has_its_own_cut_off():
     position = np.array([sine(10.0, time)[0]] * 2)
     (part,) = stretches(recorded(time, position))
     moved = motion_of(part, [10.0, 40.0])
+    assert moved.cuts == (10.0, 40.0)
     middle = slice(1000, 2000)
     assert_allclose(moved.q[0, middle], 0.5 * position[0, middle], atol=1e-6)
     assert_allclose(moved.q[1, middle], position[1, middle], atol=2e-5)
@@ -107,6 +108,7 @@ def test_a_part_of_a_motion_has_all_its_signals():
     assert piece.q.shape == piece.v.shape == piece.a.shape == (1, 20)
     assert piece.torque is not None
     assert_allclose(piece.torque[0], time[10:30])
+    assert piece.cuts == (50.0,)
 
 
 def test_torque_is_needed_where_it_is_asked_for():
