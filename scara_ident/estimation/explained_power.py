@@ -14,7 +14,7 @@ from scara_ident.estimation.own_offsets import value_beside_offsets
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.motion import Stretch, motion_of, thinned, torque_of
 from scara_ident.motion.prepared import PreparedData, PreparedStretch
-from scara_ident.motion.rest import LONGEST_WIDENING, POSITION_BAND, REST_WIDEN, Bands, fading
+from scara_ident.motion.rest import LONGEST_WIDENING, Bands, fading
 from scara_ident.threads import side_by_side
 
 # The first fit is not in a narrower band, Hz: too much about turning points would be left out to fit the rest.
@@ -127,15 +127,14 @@ def moving_weight(rest: NDArray[np.bool_], rate: float, bands: Bands) -> Array:
         Hz.
     """
     still = np.zeros_like(rest)
-    # Where a joint begins and ends to move friction is hard to tell, and fits see it: of a standstill what it was widened by and a fade
-    # count with that.
-    margin = round((LONGEST_WIDENING + REST_WIDEN / (POSITION_BAND * FIRST_BAND)) * rate)
+    # Where a joint begins and ends to move friction is hard to tell, and fits see it: of a standstill twice their fade counts
+    # with that.
+    margin = round(2.0 * LONGEST_WIDENING * rate)
     for inner, row in zip(still, rest, strict=True):
         for start, stop in runs_of(row):
             if stop - start >= rate / FIRST_BAND:
                 inner[start + margin : stop - margin] = True
-    # A spectrum asks for no step alone.
-    return fading(still, rate, bands, 0.0)
+    return fading(still, rate, bands)
 
 
 def thinned_to(data: PreparedData, rate: float) -> PreparedData:

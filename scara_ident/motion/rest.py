@@ -137,7 +137,7 @@ def slower(
     return found
 
 
-def fading(rest: NDArray[np.bool_], rate: float, bands: Bands, share: float = FADE_SHARE) -> Array:
+def fading(rest: NDArray[np.bool_], rate: float, bands: Bands) -> Array:
     """Return the weight of every sample, shape (n, N): 0 at rest, 1 away from it, and between them without a step.
 
     An equation that holds at every sample holds for both sides times any weight. With the weight zero where friction
@@ -148,14 +148,12 @@ def fading(rest: NDArray[np.bool_], rate: float, bands: Bands, share: float = FA
     rest : ndarray of bool, shape (n, N)
     rate : float
         Samples per second.
-    share : float, optional
-        Of the time between two rests, that either fade may take where it takes more than `LONGEST_WIDENING`.
     """
     result = np.ones(rest.shape)
     for weight, own, band in zip(result, rest, bands, strict=True):
         runs = runs_of(own)
         for (start, stop), gaps in zip(runs, _between(runs, len(own)), strict=True):
-            ramps = [_reach(FADE_PERIODS, rate, band, share * gap) for gap in gaps]
+            ramps = [_reach(FADE_PERIODS, rate, band, FADE_SHARE * gap) for gap in gaps]
             before, after = weight[max(0, start - ramps[0]) : start], weight[stop : stop + ramps[1]]
             before *= _rise(ramps[0])[: len(before)][::-1]
             after *= _rise(ramps[1])[: len(after)]
