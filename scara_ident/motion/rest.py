@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,10 +33,8 @@ FEW_SAMPLES = 20.0
 FADE_PERIODS = 1.0
 # The noise of an unfiltered joint is what a filter at this share of the rate takes out.
 WIDE = 0.2
-# Neither is longer than this, s, nor than these shares of the time between two rests where that is more: in a narrow band too little
-# would be left between turning points, and of a joint that stands between its moves what is not smooth there would not fade.
+# Neither is longer than this, s: in a narrow band too little would be left between turning points.
 LONGEST_WIDENING = 0.05
-WIDEN_SHARE, FADE_SHARE = 1.0 / 6.0, 1.0 / 3.0
 
 
 def position_cuts(rate: float, bands: Bands) -> list[float | None]:
@@ -63,7 +60,7 @@ def standstill(stretch: Stretch, motion: Motion, bands: Bands) -> NDArray[np.boo
         few = band is not None and stretch.rate < FEW_SAMPLES * band
         if not len(turns) or (cut is None and not few):
             continue
-        widen = _reach(REST_WIDEN, stretch.rate, band)
+        widen = _widening(REST_WIDEN, stretch.rate, band)
         # Beyond an end its own sample again, which widens no range.
         around = np.clip(turns[:, None] + np.arange(-widen, widen + 1), 0, len(v) - 1)
         if not few:
@@ -130,10 +127,10 @@ def slower(
     """Return where each joint is slower than a speed for some samples, shape (n, N), widened as `standstill`, by so many s at most."""
     found = np.zeros(v.shape, dtype=bool)
     for own, slow, band in zip(found, np.abs(v) <= speeds[:, None], bands, strict=True):
-        runs = [(start, stop) for start, stop in runs_of(slow) if stop - start > 1]
-        for (start, stop), (before, after) in zip(runs, _between(runs, len(slow)), strict=True):
-            left, right = (_reach(REST_WIDEN, rate, band, WIDEN_SHARE * gap, longest) for gap in (before, after))
-            own[max(0, start - left) : stop + right] = True
+        widen = _widening(REST_WIDEN, rate, band, longest)
+        for start, stop in runs_of(slow):
+            if stop - start > 1:
+                own[max(0, start - widen) : stop + widen] = True
     return found
 
 
@@ -150,35 +147,19 @@ def fading(rest: NDArray[np.bool_], rate: float, bands: Bands) -> Array:
         Samples per second.
     """
     result = np.ones(rest.shape)
-    for weight, own, band in zip(result, rest, bands, strict=True):
-        runs = runs_of(own)
-        for (start, stop), gaps in zip(runs, _between(runs, len(own)), strict=True):
-            ramps = [_reach(FADE_PERIODS, rate, band, FADE_SHARE * gap) for gap in gaps]
-            before, after = weight[max(0, start - ramps[0]) : start], weight[stop : stop + ramps[1]]
-            before *= _rise(ramps[0])[: len(before)][::-1]
-            after *= _rise(ramps[1])[: len(after)]
-            weight[start:stop] = 0.0
+    for j, band in enumerate(bands):
+        ramp = _widening(FADE_PERIODS, rate, band)
+        rise = np.sin(0.5 * np.pi * np.arange(1, ramp + 1) / (ramp + 1)) ** 2
+        for start, stop in runs_of(rest[j]):
+            before, after = result[j, max(0, start - ramp) : start], result[j, stop : stop + ramp]
+            before *= rise[: len(before)][::-1]
+            after *= rise[: len(after)]
+            result[j, start:stop] = 0.0
     return result
 
 
-def _between(runs: Sequence[tuple[int, int]], count: int) -> list[tuple[int, int]]:
-    """Return of runs among so many samples how many lie between each and the one before, and the one after."""
-    stops, starts = [0, *(stop for _, stop in runs)], [*(start for start, _ in runs), count]
-    gaps = [start - stop for stop, start in zip(stops, starts, strict=True)]
-    return list(pairwise(gaps))
-
-
-def _rise(ramp: int) -> Array:
-    return np.asarray(np.sin(0.5 * np.pi * np.arange(1, ramp + 1) / (ramp + 1)) ** 2)
-
-
-def _reach(
-    periods: float, rate: float, band: float | None, share: float = 0.0, longest: float = LONGEST_WIDENING
-) -> int:
-    """Return so many periods of the position's low-pass in samples, at most the longest, s, or the share, samples, if that is more."""
-    if band is None:
-        return 1
-    return max(1, int(min(rate * periods / (POSITION_BAND * band), max(rate * longest, share))))
+def _widening(periods: float, rate: float, band: float | None, longest: float = LONGEST_WIDENING) -> int:
+    return 1 if band is None else max(1, int(rate * min(periods / (POSITION_BAND * band), longest)))
 
 
 def velocity_noise(stretch: Stretch, motion: Motion, joint: int, band: float | None, least: float) -> float:

@@ -183,28 +183,3 @@ def test_friction_that_no_turn_tells_from_an_offset_is_not_told(run: Recording):
     std = dict(zip(found.model.names, found.estimate.std, strict=True))
     assert min(std[name] for name in ("a01", "a02", "p_o1", "p_o2")) > 0.3
     assert max(std[name] for name in ("a11", "a12")) < 0.01
-
-
-def test_a_fade_takes_a_period_of_the_filter_where_there_is_time_for_it():
-    """And the third of the time between two rests where there is not, down to 0.05 s."""
-    rest = np.zeros((1, 5000), dtype=bool)
-    for start, stop in ((1000, 1500), (1650, 1700), (1730, 2000)):
-        rest[0, start:stop] = True
-    (weight,) = fading(rest, RATE, (1.0,))
-    faded = [np.flatnonzero(part < 1.0 - 1e-12).size for part in (weight[:1000], weight[2000:])]
-    assert faded == [166, 166]
-    assert np.flatnonzero(weight[1500:1650] < 1.0 - 1e-12).size == 2 * 50
-    # Two ramps of 0.05 s do not fit: they meet.
-    assert np.all(weight[1700:1730] < 1.0)
-    assert_allclose(weight, fading(rest[:, ::-1], RATE, (1.0,))[0, ::-1])
-
-
-def test_slow_stretches_are_widened_by_half_a_period_where_there_is_time_for_it():
-    v = np.ones((1, 5000))
-    for start, stop in ((1000, 1500), (1650, 1700), (4999, 5000)):
-        v[0, start:stop] = 0.0
-    (found,) = slower(v, np.array([0.1]), RATE, (1.0,))
-    assert np.flatnonzero(found[:1000]).size == np.flatnonzero(found[1700:]).size == 83
-    assert np.flatnonzero(found[1500:1650]).size == 2 * 25
-    (fast,) = slower(v, np.array([0.1]), RATE, (50.0,))
-    assert np.flatnonzero(fast[:1000]).size == 1
