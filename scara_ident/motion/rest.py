@@ -21,8 +21,6 @@ POSITION_BAND = 3.0
 REST_SHARE = 3e-3
 REST_NOISE = 5.0
 REST_WIDEN = 0.5
-# What stands for this many of its periods rings in it, before it sets out and after it has stopped: see `standing`.
-STAND = 0.5
 # A turn is sharp where the acceleration about it has a range of more than this share of itself beyond the band, where smooth motion
 # has none: there friction makes it jump, and the filter moves the turn by a thousandth of the band's period and more.
 SHARP = 0.2
@@ -51,7 +49,7 @@ def standstill(stretch: Stretch, motion: Motion, bands: Bands) -> NDArray[np.boo
     rounds that off, moves the time of the turn. Where samples are few, so is every turn.
     """
     speeds, stepping = rest_speeds(stretch, motion, bands), stepping_speeds(stretch, bands)
-    found = slower(motion.v, speeds, stretch.rate, bands) | standing(stretch, speeds, bands)
+    found = slower(motion.v, speeds, stretch.rate, bands)
     if np.any(stepping >= speeds):
         # Where steps decide a joint goes to and fro, for half a period of the filter each way, however long that is.
         found |= slower(motion.v, np.where(stepping >= speeds, stepping, -1.0), stretch.rate, bands, longest=np.inf)
@@ -68,34 +66,6 @@ def standstill(stretch: Stretch, motion: Motion, bands: Bands) -> NDArray[np.boo
             sharp = np.ptp(fast, axis=1) > SHARP * np.max(np.abs(a[around]), axis=1)
             around = around[sharp]
         own[around] = True
-    return found
-
-
-def standing(stretch: Stretch, speeds: Array, bands: Bands) -> NDArray[np.bool_]:
-    """Return where each joint stands as its positions say that no filter has passed, shape (n, N).
-
-    A joint that sets out at once, as one that breaks away, has a filtered speed of either sign and up to a tenth of that to come
-    for some periods before. The difference of means over half a period after and before a sample has no such memory, and noise
-    as that of the filtered speed: 0.8 of it, if it is white. It tells what stands for as long as that, and half a period less of it at
-    either end.
-
-    Parameters
-    ----------
-    speeds : ndarray, shape (n,)
-        Below which noise may be what moves each joint, see `rest_speeds`.
-    """
-    found = np.zeros(stretch.position.shape, dtype=bool)
-    cuts = position_cuts(stretch.rate, bands)
-    for own, q, speed, cut in zip(found, stretch.position, speeds, cuts, strict=True):
-        if cut is None:
-            continue
-        half = max(1, int(STAND * stretch.rate / cut))
-        total = np.concatenate([[0.0], np.cumsum(np.pad(q - q[0], half, mode="edge"))])
-        means = (total[half:] - total[:-half]) / half
-        v = (means[half + 1 :] - means[: len(q)]) * (stretch.rate / (half + 1))
-        for start, stop in runs_of(np.abs(v) <= speed):
-            if stop - start >= half:
-                own[max(0, start - half) : stop + half] = True
     return found
 
 

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from scara_ident.identification.identify import identify
 from scara_ident.motion.low_pass import low_pass
 from scara_ident.motion.position_noise import noisier
 from scara_ident.motion.prepared import PreparedStretch, prepare
-from scara_ident.motion.rest import FEW_SAMPLES, fading, position_cuts, rest_speeds, slower, standing
+from scara_ident.motion.rest import FEW_SAMPLES, fading, position_cuts, rest_speeds, slower
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import load_robot
 from tests.arms import PLANAR_2R, swing, write_urdf
@@ -128,58 +127,3 @@ def test_positions_pass_a_wider_filter_than_rows_where_the_rate_allows(run: Reco
     part = only(run, (4.0, 8.0))
     for j, cut in enumerate((12.0, 24.0)):
         assert_allclose(part.motion.q[j], low_pass(run.position[j], RATE, cut), atol=1e-13)
-
-
-def breaking_away(run: Recording, noise: float, step: float = 0.0) -> Recording:
-    """Return a recording of joints that stand until 4 s, then are at once as fast as they go on, and stop as suddenly at 12 s."""
-    time = np.arange(8000) / RATE
-    v = np.where((time >= 4.0) & (time < 12.0), 0.2 + 0.05 * np.sin(time), 0.0)
-    position = np.cumsum(v) / RATE + noise * np.random.default_rng(0).standard_normal((2, len(v)))
-    position = position if not step else step * np.round(position / step)
-    return replace(run, time=time, position=position, effort=np.zeros(position.shape), velocity=None)
-
-
-@pytest.mark.parametrize("band", [1.0, 2.0, 10.0])
-@pytest.mark.parametrize(("noise", "step"), [(0.0, 0.0), (1e-5, 0.0), (0.0, 1e-3)])
-def test_a_joint_that_stands_does_not_move_for_the_filter_that_rings(
-    run: Recording, band: float, noise: float, step: float
-):
-    """All that told Coulomb friction from an offset were speeds that it had before it broke away, of the other sign."""
-    part = only(breaking_away(run, noise, step), (band, band))
-    assert np.min(part.motion.v) < -0.003
-    stands = (part.stretch.time < 4.0) | (part.stretch.time >= 12.0)
-    assert part.rest[:, stands].all()
-    assert np.all(part.motion.v[part.used] > 0.0)
-    # No more than the filter's memory is lost where it moves.
-    assert part.rest[:, ~stands].mean() < 0.02 + 2.0 / 3.0 / band / 8.0
-
-
-@pytest.mark.parametrize("band", [2.0, 10.0])
-def test_a_joint_that_turns_smoothly_stands_nowhere(run: Recording, band: float):
-    time = np.arange(8000) / RATE
-    noise = 1e-5 * np.random.default_rng(0).standard_normal((2, len(time)))
-    made = replace(run, time=time, position=np.sin(time) + noise, effort=np.zeros((2, len(time))), velocity=None)
-    part = only(made, (band, band))
-    speeds = rest_speeds(part.stretch, part.motion, part.bands)
-    assert not standing(part.stretch, speeds, part.bands).any()
-    assert not standing(part.stretch, speeds, (None, None)).any()
-
-
-def test_friction_that_no_turn_tells_from_an_offset_is_not_told(run: Recording):
-    """A joint that goes one way alone had both, 17 standard deviations off, by the ringing of a narrow band."""
-    robot = load_robot()
-    made = breaking_away(run, 1e-6)
-    moved = np.gradient(made.position, made.time, axis=1)
-    stands = (made.time < 4.0) | (made.time >= 12.0)
-    # What holds it still is less than Coulomb's friction, and of either sign.
-    torque = np.where(stands, 0.2 * np.sin(made.time), 1.0 + 0.3 * moved)
-    torque = torque + 1e-3 * np.random.default_rng(1).standard_normal((2, len(made.time)))
-    found = identify(
-        robot,
-        [Recording("M_1", "M", 1, robot.joints, made.time, made.position, torque)],
-        model="basic",
-        bands=(1.0, 1.0),
-    )
-    std = dict(zip(found.model.names, found.estimate.std, strict=True))
-    assert min(std[name] for name in ("a01", "a02", "p_o1", "p_o2")) > 0.3
-    assert max(std[name] for name in ("a11", "a12")) < 0.01
