@@ -260,7 +260,8 @@ def noisier(data: PreparedData, seed: int = 0) -> PreparedData:
     """Return recordings with the noise of their positions once more on top.
 
     Where an encoder has steps, those of the same size about another zero are added, so that what follows the motion in
-    them does so again; where it has none, or scatters by more, white noise of the size that the filter takes out.
+    them does so again; where it has none, or scatters by more, white noise of the size that the filter takes out. Rows are
+    of the same samples: how noise moves what is estimated from them is asked, not what fewer of them say.
 
     Parameters
     ----------
@@ -289,7 +290,8 @@ def _drawn(data: PreparedData, seed: int) -> PreparedData:
     recordings = []
     for item, each in zip(data.recordings, noise_sizes(data), strict=True):
         parts = tuple(
-            replace(part, stretch=_noisier(part, sizes, rng)) for part, sizes in zip(item.stretches, each, strict=True)
+            replace(part, stretch=_noisier(part, sizes, rng), rests_as=part)
+            for part, sizes in zip(item.stretches, each, strict=True)
         )
         recordings.append(PreparedRecording(item.recording, parts))
     return replace(data, recordings=tuple(recordings))

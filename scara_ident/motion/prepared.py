@@ -50,11 +50,14 @@ class PreparedStretch:
         Low-pass on both sides of each joint's equation, Hz; None filters nothing.
     left_out : ndarray of bool, shape (N,), or False
         Samples that count as at rest, for an event left out of the fit.
+    rests_as : PreparedStretch or None
+        Another of the same motion, which says where the joints stand still.
     """
 
     stretch: Stretch
     bands: tuple[float | None, ...]
     left_out: NDArray[np.bool_] | bool = False
+    rests_as: PreparedStretch | None = None
 
     @property
     def name(self) -> str:
@@ -70,6 +73,11 @@ class PreparedStretch:
     def samples(self) -> int:
         """Number of samples N."""
         return len(self.stretch.time)
+
+    def at(self, bands: Bands) -> PreparedStretch:
+        """Return it in other bands."""
+        rests_as = None if self.rests_as is None else self.rests_as.at(bands)
+        return replace(self, bands=tuple(bands), rests_as=rests_as)
 
     def with_torque_of(self, stretch: Stretch) -> PreparedStretch:
         """Return it with a stretch that differs by its torque alone; what the motion decides is shared."""
@@ -99,6 +107,8 @@ class PreparedStretch:
     def motion(self) -> Motion:
         """Filtered position, velocity and acceleration on the whole time grid, with where the joints stand still."""
         found = motion_of(self.stretch, position_cuts(self.rate, self.bands))
+        if self.rests_as is not None:
+            return replace(found, fade=self.rests_as.motion.fade)
         still = standstill(self.stretch, found, self.bands) | self.stretch.clipped
         return replace(found, fade=fading(still, self.rate, self.bands))
 
@@ -226,7 +236,7 @@ class PreparedRecording:
         """Return it in other bands; what does not depend on them is shared."""
         if tuple(bands) == self.bands:
             return self
-        return replace(self, stretches=tuple(replace(part, bands=tuple(bands)) for part in self.stretches))
+        return replace(self, stretches=tuple(part.at(bands) for part in self.stretches))
 
     def with_effort_of(self, recording: Recording) -> PreparedRecording:
         """Return it with the effort of another recording of the same samples; the motion is shared."""

@@ -72,6 +72,9 @@ def test_positions_with_their_noise_once_more_rest_where_they_did(run: Recording
     )
     (again,) = noisier(data).stretches
     assert again.stretch.steps == part.stretch.steps and again.rest[:, slow].all()
+    (before,), (wider,) = data.stretches, noisier(data).at((4.0, 4.0)).stretches
+    assert np.array_equal(again.rest, before.rest) and np.array_equal(again.fade, before.fade)
+    assert np.array_equal(wider.rest, data.at((4.0, 4.0)).stretches[0].rest)
 
 
 def turning(
