@@ -32,7 +32,7 @@ AT_ONCE = 8192
 # Samples that are looked at, at the most, at each rate; and up to which repetitions are, which tell no more of a motion and only
 # average noise.
 ENOUGH_SAMPLES = 20_000
-ENOUGH_WITH_REPETITIONS = 10_000
+ENOUGH_WITH_REPETITIONS = 4_000
 
 
 @dataclass(frozen=True)
