@@ -17,7 +17,7 @@ from scara_ident.estimation.observations import Observations, observe
 from scara_ident.motion.motion import Motion
 from scara_ident.motion.position_noise import forget_noisier, noisier, unresolved_joints
 from scara_ident.motion.prepared import PreparedStretch
-from scara_ident.motion.rest import Bands, position_cuts
+from scara_ident.motion.rest import Bands
 from scara_ident.processes import halved
 from scara_ident.threads import side_by_side
 
@@ -220,10 +220,7 @@ class CandidateColumns:
     def leave(self) -> None:
         """Forget what only these bands have a use for, once a search goes on in others."""
         below = {
-            cut
-            for bands in self._at
-            for part in self.observations.data.stretches
-            for cut in position_cuts(part.rate, bands)
+            cut for columns in self._at.values() for part in columns.observations.data.stretches for cut in part.cuts
         }
         self.lean()
         forget_noisier(self.observations.data)

@@ -21,7 +21,6 @@ from scara_ident.effects.parameters import Parameter
 from scara_ident.effects.signals import Scene
 from scara_ident.motion.low_pass import differentiate
 from scara_ident.motion.prepared import PreparedRecording, PreparedStretch
-from scara_ident.motion.rest import position_cuts
 
 # Share of a stretch's samples that the second encoder must have.
 KNOWN = 0.99
@@ -129,7 +128,7 @@ def _lag(item: PreparedRecording, part: PreparedStretch, joint: int) -> Array | 
 def _columns(scene: Scene, part: PreparedStretch, joint: int, lag: Array) -> tuple[Array, float]:
     """Return the lag, its derivative, the acceleration and the friction's columns, (k, N), and the lag's noise in the band."""
     model, motion = scene.model, part.motion
-    cut = position_cuts(part.rate, part.bands)[joint]
+    cut = part.cuts[joint]
     smooth, first, _ = differentiate(lag, part.rate, cut)
     place = model.place(model.rigid_body)
     own = model.active[joint]

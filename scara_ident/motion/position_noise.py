@@ -16,7 +16,7 @@ from scara_ident.arrays import NORMAL_MEDIAN, Array, median
 from scara_ident.motion.low_pass import low_pass, removed_share
 from scara_ident.motion.motion import Stretch
 from scara_ident.motion.prepared import PreparedData, PreparedRecording, PreparedStretch
-from scara_ident.motion.rest import REST_NOISE, WIDE, position_cuts, stepping_speeds, velocity_noise
+from scara_ident.motion.rest import REST_NOISE, WIDE, stepping_speeds, velocity_noise
 from scara_ident.threads import side_by_side
 
 # An interval longer than so many usual ones has lost samples; a clock is uneven, and its stamps rounded, from these shares of the
@@ -66,11 +66,11 @@ def coarse_positions(item: PreparedRecording) -> str | None:
     nyquist = 0.5 * part.rate
     apart = min(part.samples - 1, max(1, round(SPEED_OVER * part.rate)))
     found = []
-    slow = stepping_speeds(part.stretch, part.bands)
+    slow = stepping_speeds(part.stretch, part.cuts)
     for joint, (position, step) in enumerate(zip(part.stretch.position, part.stretch.steps, strict=True)):
         if step is None:
             continue
-        cut = position_cuts(part.rate, part.bands)[joint] or nyquist
+        cut = part.cuts[joint] or nyquist
         # White noise of a step's rounding, differentiated, up to the filter's frequency.
         noise = step / np.sqrt(12.0) * 2.0 * np.pi * np.sqrt(cut**3 / (3.0 * nyquist))
         speed = np.sqrt(np.mean((position[apart:] - position[:-apart]) ** 2)) * part.rate / apart
@@ -159,7 +159,7 @@ def noise_level(part: PreparedStretch, joint: int) -> float:
 
 def _smooth(part: PreparedStretch, joint: int, widest: float = WIDE) -> tuple[Array, float]:
     """Return a filtered position, shape (N,), and the filter's frequency, at most this share of the rate."""
-    cut, widest = position_cuts(part.stretch.rate, part.bands)[joint], widest * part.stretch.rate
+    cut, widest = part.cuts[joint], widest * part.stretch.rate
     if cut is not None and cut <= widest:
         return part.motion.q[joint], cut
     return part.stretch.filtered(joint, widest)[0], widest

@@ -106,11 +106,16 @@ class PreparedStretch:
     @made_once
     def motion(self) -> Motion:
         """Filtered position, velocity and acceleration on the whole time grid, with where the joints stand still."""
-        found = motion_of(self.stretch, position_cuts(self.rate, self.bands))
+        found = motion_of(self.stretch, self.cuts)
         if self.rests_as is not None:
             return replace(found, fade=self.rests_as.motion.fade)
         still = standstill(self.stretch, found, self.bands) | self.stretch.clipped
         return replace(found, fade=fading(still, self.rate, self.bands))
+
+    @made_once
+    def cuts(self) -> tuple[float | None, ...]:
+        """Low-pass of each joint's positions, Hz, see `position_cuts`."""
+        return position_cuts(self.stretch, self.bands) if self.rests_as is None else self.rests_as.cuts
 
     @property
     def torque(self) -> Array:

@@ -9,12 +9,14 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import NORMAL_MEDIAN, Array, median, runs_of
 from scara_ident.motion.low_pass import HIGHEST_CUT, low_pass
-from scara_ident.motion.motion import Motion, Stretch
+from scara_ident.motion.motion import Motion, Stretch, motion_of
 
 Bands = Sequence[float | None]
 
-# Positions pass a filter three times as wide as the band: inside the band it then changes them by under 2e-4.
-POSITION_BAND = 3.0
+# Positions pass a filter at least three times as wide as the band: inside the band it then changes them by under 2e-4. Where a joint
+# breaks away or turns sharply it rings, so that it is wider, up to ten times, as far as the noise of positions leaves what counts as
+# rest as it is.
+POSITION_BAND, WIDEST_BAND = 3.0, 10.0
 # A joint stands still where its speed stays below this share of its peak, or below this many standard deviations of its
 # velocity's noise: friction is then anything up to Coulomb's. So it is where its encoder makes less than a step in each period of the
 # position's low-pass, which lets the steps pass. That low-pass widens it by this many of its periods.
@@ -35,25 +37,52 @@ WIDE = 0.2
 LONGEST_WIDENING = 0.05
 
 
-def position_cuts(rate: float, bands: Bands) -> list[float | None]:
-    """Return the cut-offs of the positions that go with the bands; None where that is beyond half the rate."""
+def position_cuts(stretch: Stretch, bands: Bands) -> tuple[float | None, ...]:
+    """Return the cut-offs, Hz, of a stretch's positions that go with some bands; None where the least is beyond half the rate.
+
+    The noise of a speed grows with the cut-off to the power of 3/2, the speed at which an encoder's steps pass with the cut-off: it
+    is as high as leaves both below the share of the peak speed that counts as rest.
+    """
+    least = _narrowest(stretch.rate, bands)
+    widest = [
+        None if cut is None else min(WIDEST_BAND / POSITION_BAND * cut, HIGHEST_CUT * stretch.rate) for cut in least
+    ]
+    motion = motion_of(stretch, widest)
+    found: list[float | None] = []
+    for joint, (narrow, wide) in enumerate(zip(least, widest, strict=True)):
+        if narrow is None or wide is None:
+            found.append(None)
+            continue
+        slow = REST_SHARE * float(np.max(np.abs(motion.v[joint])))
+        noise = REST_NOISE * velocity_noise(stretch, motion, joint, bands[joint], slow / REST_NOISE)
+        step = (stretch.steps[joint] if stretch.steps else None) or 0.0
+        share = (slow / noise) ** (2.0 / 3.0) if noise > 0.0 else 1.0
+        found.append(max(narrow, min(share, slow / (step * wide) if step else 1.0) * wide))
+    # What was only looked at is not kept.
+    stretch.forget_filtered({cut for cut in widest if cut is not None and cut not in found})
+    return tuple(found)
+
+
+def _narrowest(rate: float, bands: Bands) -> list[float | None]:
+    """Return the least cut-offs of positions, Hz."""
     return [
         None if band is None or POSITION_BAND * band > HIGHEST_CUT * rate else POSITION_BAND * band for band in bands
     ]
 
 
 def standstill(stretch: Stretch, motion: Motion, bands: Bands) -> NDArray[np.bool_]:
-    """Return where each joint stands still, shape (n, N), widened by the memory of the position's filter.
+    """Return where each joint stands still, shape (n, N), widened by the memory of the narrowest filter of positions.
 
     So is where it turns sharply, however fast: friction jumps there and the acceleration with it, and the filter, which
     rounds that off, moves the time of the turn. Where samples are few, so is every turn.
     """
-    speeds, stepping = rest_speeds(stretch, motion, bands), stepping_speeds(stretch, bands)
+    speeds, stepping = rest_speeds(stretch, motion, bands), stepping_speeds(stretch, motion.cuts)
     found = slower(motion.v, speeds, stretch.rate, bands)
     if np.any(stepping >= speeds):
         # Where steps decide a joint goes to and fro, for half a period of the filter each way, however long that is.
         found |= slower(motion.v, np.where(stepping >= speeds, stepping, -1.0), stretch.rate, bands, longest=np.inf)
-    for own, v, a, cut, band in zip(found, motion.v, motion.a, position_cuts(stretch.rate, bands), bands, strict=True):
+    least = _narrowest(stretch.rate, bands)
+    for own, v, a, cut, band in zip(found, motion.v, motion.a, least, bands, strict=True):
         turns = np.flatnonzero(np.diff(np.signbit(v)) & ~own[:-1]) + 1
         few = band is not None and stretch.rate < FEW_SAMPLES * band
         if not len(turns) or (cut is None and not few):
@@ -62,7 +91,8 @@ def standstill(stretch: Stretch, motion: Motion, bands: Bands) -> NDArray[np.boo
         # Beyond an end its own sample again, which widens no range.
         around = np.clip(turns[:, None] + np.arange(-widen, widen + 1), 0, len(v) - 1)
         if not few:
-            fast = (a - low_pass(a, stretch.rate, band))[around]
+            # Beyond the least cut-off there is more noise than motion.
+            fast = (low_pass(a, stretch.rate, cut) - low_pass(a, stretch.rate, band))[around]
             sharp = np.ptp(fast, axis=1) > SHARP * np.max(np.abs(a[around]), axis=1)
             around = around[sharp]
         own[around] = True
@@ -73,20 +103,19 @@ def rest_speeds(stretch: Stretch, motion: Motion, bands: Bands) -> Array:
     """Return the speeds below which noise, or a step of its encoder, may be what moves each joint, shape (n,)."""
     least = REST_SHARE / REST_NOISE * np.max(np.abs(motion.v), axis=1)
     # Those that are not filtered pass a wide filter together.
-    unfiltered = [j for j, cut in enumerate(position_cuts(stretch.rate, bands)) if cut is None]
+    unfiltered = [j for j, cut in enumerate(motion.cuts) if cut is None]
     stretch.filter_all(dict.fromkeys(unfiltered, WIDE * stretch.rate))
     noise = [velocity_noise(stretch, motion, j, bands[j], least[j]) for j in range(len(bands))]
     # While a joint rests its encoder is silent, and most of a recording may be rest: then that noise is too small.
-    return np.maximum(REST_NOISE * np.array(noise), stepping_speeds(stretch, bands))
+    return np.maximum(REST_NOISE * np.array(noise), stepping_speeds(stretch, motion.cuts))
 
 
-def stepping_speeds(stretch: Stretch, bands: Bands) -> Array:
+def stepping_speeds(stretch: Stretch, cuts: Bands) -> Array:
     """Return the speed of each joint below which its encoder's steps are slower than what passes the filter, shape (n,).
 
     Steps of size s at the speed v come v/s times a second. Their fundamental has an amplitude of 2 v in the velocity: where the filter
     lets it pass, the joint seems to go to and fro. Zero of a joint whose positions do not go in steps.
     """
-    cuts = position_cuts(stretch.rate, bands)
     steps = stretch.steps or (None,) * len(cuts)
     return np.array([(step or 0.0) * (cut or 0.5 * stretch.rate) for step, cut in zip(steps, cuts, strict=True)])
 
@@ -137,7 +166,7 @@ def velocity_noise(stretch: Stretch, motion: Motion, joint: int, band: float | N
 
     White position noise of density s/rate integrates to ``s (2 pi)^2 f^3 / 3`` in velocity up to f.
     """
-    cut = reach = position_cuts(stretch.rate, [band])[0]
+    cut = reach = motion.cuts[joint]
     if cut is None or reach is None:
         # Nothing was filtered; the noise is what a wide filter would take out. Within a wide band all of it is there.
         cut = WIDE * stretch.rate

@@ -22,7 +22,6 @@ from scara_ident.estimation.observations import Observations, observe
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.motion import stretches
 from scara_ident.motion.position_noise import noisier
-from scara_ident.motion.rest import position_cuts
 from scara_ident.robot.robot import load_robot
 from tests.diagnosis.made import exact_runs, observed
 from tests.effects.scenes import scene_of
@@ -198,6 +197,6 @@ def test_bands_that_are_left_take_what_only_they_needed_with_them():
     cuts = {cut for _, cut in part._filtered}
     columns.leave()
     left = {cut for _, cut in part._filtered}
-    assert left < cuts and not left & set(position_cuts(part.rate, below.observations.data.bands))
-    assert set(position_cuts(part.rate, observations.data.bands)) <= left
+    assert left < cuts and not left & set(below.observations.data.stretches[0].cuts)
+    assert set(observations.data.stretches[0].cuts) <= left
     assert noisier(observations.data) is not drawn

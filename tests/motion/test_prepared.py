@@ -17,7 +17,6 @@ from scara_ident.model.model import TorqueModel
 from scara_ident.motion.low_pass import low_pass
 from scara_ident.motion.motion import stretches
 from scara_ident.motion.prepared import BLOCK_SECONDS, PreparedStretch, prepare, row_step
-from scara_ident.motion.rest import position_cuts
 from scara_ident.recording.audit import Finding
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import Robot, load_robot
@@ -212,7 +211,7 @@ def test_an_identification_makes_stretches_once_and_motion_and_columns_once_per_
     assert {name: counted[name] for name in (*names, "c_1")} == dict.fromkeys((*names, "c_1"), 1)
     assert max(counted.values()) == 1
     cuts = {key[1] for key in counted if isinstance(key, tuple)}
-    assert set(position_cuts(RATE, result.bands)) <= cuts
+    assert {cut for part in result.training.data.stretches for cut in part.cuts} <= cuts
 
 
 def test_signals_of_several_joints_pass_the_filter_together_as_alone(run: Recording):

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from scara_ident.motion.low_pass import low_pass
+from scara_ident.motion.low_pass import HIGHEST_CUT, low_pass
 from scara_ident.motion.position_noise import noisier
 from scara_ident.motion.prepared import PreparedStretch, prepare
-from scara_ident.motion.rest import FEW_SAMPLES, fading, position_cuts, rest_speeds, slower
+from scara_ident.motion.rest import FEW_SAMPLES, fading, rest_speeds, slower
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import load_robot
 from tests.arms import PLANAR_2R, swing, write_urdf
@@ -107,9 +108,10 @@ def test_where_samples_are_few_every_turn_is_left_out(run: Recording):
     # The widest is of positions that are not filtered.
     for band, left_out in ((4.0, False), (0.99 * few, False), (1.01 * few, True), (0.2 * RATE, True)):
         part, fast = turning(run, position, (band, band))
-        for joint in range(2):
-            assert len(fast[joint]) > 3
-            assert np.all(part.rest[joint, fast[joint]] == left_out)
+        for joint, own in enumerate(fast):
+            turns = own[(own > part.trim) & (own < part.samples - part.trim)]
+            assert len(turns) > 3
+            assert np.all(part.rest[joint, turns] == left_out)
         assert part.rest.mean() < 0.1
 
 
@@ -126,7 +128,30 @@ def test_the_weight_is_zero_at_rest_one_away_from_it_and_has_no_step():
 
 
 def test_positions_pass_a_wider_filter_than_rows_where_the_rate_allows(run: Recording):
-    assert position_cuts(1000.0, [10.0, None, 200.0]) == [30.0, None, None]
     part = only(run, (4.0, 8.0))
-    for j, cut in enumerate((12.0, 24.0)):
+    assert part.cuts == (40.0, 80.0)
+    for j, cut in enumerate(part.cuts):
+        assert cut is not None
         assert_allclose(part.motion.q[j], low_pass(run.position[j], RATE, cut), atol=1e-13)
+    assert only(run, (None, 0.149 * RATE)).cuts == (None, pytest.approx(HIGHEST_CUT * RATE))
+    assert only(run, (None, 0.151 * RATE)).cuts == (None, None)
+
+
+@pytest.mark.parametrize("band", [2.0, 10.0])
+def test_positions_are_filtered_as_little_as_leaves_what_is_at_rest_as_it_is(run: Recording, band: float):
+    rng, time = np.random.default_rng(0), np.arange(8000) / RATE
+    exact = np.array([np.sin(2.0 * time), np.cos(2.0 * time)])
+    cuts = []
+    for noise, step in ((0.0, 0.0), (3e-6, 0.0), (2e-5, 0.0), (1e-2, 0.0), (0.0, 2e-4), (0.0, 0.1)):
+        position = exact + noise * rng.standard_normal(exact.shape)
+        position = position if not step else step * np.round(position / step)
+        made = replace(run, time=time, position=position, effort=np.zeros(exact.shape), velocity=None)
+        part = only(made, (band, band))
+        (cut, same) = part.cuts
+        assert cut is not None and same == pytest.approx(cut, rel=0.1)
+        cuts.append(cut)
+        if 3.0 * band < cut < 10.0 * band:
+            # Speeds that noise or a step makes are as high as what counts as rest of any joint.
+            assert rest_speeds(part.stretch, part.motion, part.bands) == pytest.approx([6e-3] * 2, rel=0.3)
+    assert cuts[0] == 10.0 * band and cuts[3] == cuts[5] == 3.0 * band
+    assert all(later <= cut for cut, later in pairwise(cuts[:4])) and 3.0 * band <= cuts[4] < 40.0
