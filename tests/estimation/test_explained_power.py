@@ -51,7 +51,8 @@ def runs(trajectories: int, repetitions: int, samples: int) -> PreparedData:
 @pytest.mark.parametrize(
     ("trajectories", "repetitions", "samples", "names"),
     [
-        (2, 3, 2000, ["T0_1", "T1_1", "T0_2", "T1_2", "T0_3"]),
+        (2, 3, 800, ["T0_1", "T1_1", "T0_2", "T1_2", "T0_3"]),
+        (2, 3, 2000, ["T0_1", "T1_1"]),
         (3, 2, 4000, ["T0_1", "T1_1", "T2_1"]),
         (6, 1, 4000, ["T0_1", "T1_1", "T2_1", "T3_1", "T4_1"]),
         (1, 2, 30_000, ["T0_1"]),
