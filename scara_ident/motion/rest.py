@@ -13,10 +13,8 @@ from scara_ident.motion.motion import Motion, Stretch, motion_of
 
 Bands = Sequence[float | None]
 
-# Positions pass a filter at least three times as wide as the band: inside the band it then changes them by under 2e-4. Where a joint
-# breaks away or turns sharply it rings, so that it is wider, up to ten times, as far as the noise of positions leaves what counts as
-# rest as it is.
-POSITION_BAND, WIDEST_BAND = 3.0, 10.0
+# Positions pass a filter at least three times as wide as the band: inside the band it then changes them by under 2e-4.
+POSITION_BAND = 3.0
 # A joint stands still where its speed stays below this share of its peak, or below this many standard deviations of its
 # velocity's noise: friction is then anything up to Coulomb's. So it is where its encoder makes less than a step in each period of the
 # position's low-pass, which lets the steps pass. That low-pass widens it by this many of its periods.
@@ -33,33 +31,34 @@ FEW_SAMPLES = 20.0
 FADE_PERIODS = 1.0
 # The noise of an unfiltered joint is what a filter at this share of the rate takes out.
 WIDE = 0.2
-# Neither is longer than this, s: in a narrow band too little would be left between turning points.
+# Neither is longer than this, s: in a narrow band too little would be left between turning points. So the low-pass has no longer
+# period either, as far as the noise of positions leaves what counts as rest as it is: where a joint breaks away or turns sharply it rings.
 LONGEST_WIDENING = 0.05
 
 
 def position_cuts(stretch: Stretch, bands: Bands) -> tuple[float | None, ...]:
     """Return the cut-offs, Hz, of a stretch's positions that go with some bands; None where the least is beyond half the rate.
 
-    The noise of a speed grows with the cut-off to the power of 3/2, the speed at which an encoder's steps pass with the cut-off: it
-    is as high as leaves both below the share of the peak speed that counts as rest.
+    One whose period is longer than both sides of the equation fade out is raised. The noise of a speed grows with the cut-off to the power
+    of 3/2, the speed at which an encoder's steps pass with the cut-off: it is raised as far as leaves both below the share of the peak
+    speed that counts as rest.
     """
     least = _narrowest(stretch.rate, bands)
-    widest = [
-        None if cut is None else min(WIDEST_BAND / POSITION_BAND * cut, HIGHEST_CUT * stretch.rate) for cut in least
-    ]
-    motion = motion_of(stretch, widest)
-    found: list[float | None] = []
-    for joint, (narrow, wide) in enumerate(zip(least, widest, strict=True)):
-        if narrow is None or wide is None:
-            found.append(None)
-            continue
+    widest = min(1.0 / LONGEST_WIDENING, HIGHEST_CUT * stretch.rate)
+    found = [cut if cut is None else max(cut, widest) for cut in least]
+    raised = [joint for joint, cut in enumerate(least) if cut is not None and cut < widest]
+    if not raised:
+        return tuple(found)
+    motion = motion_of(stretch, found)
+    for joint in raised:
         slow = REST_SHARE * float(np.max(np.abs(motion.v[joint])))
         noise = REST_NOISE * velocity_noise(stretch, motion, joint, bands[joint], slow / REST_NOISE)
         step = (stretch.steps[joint] if stretch.steps else None) or 0.0
-        share = (slow / noise) ** (2.0 / 3.0) if noise > 0.0 else 1.0
-        found.append(max(narrow, min(share, slow / (step * wide) if step else 1.0) * wide))
-    # What was only looked at is not kept.
-    stretch.forget_filtered({cut for cut in widest if cut is not None and cut not in found})
+        share = min((slow / noise) ** (2.0 / 3.0) if noise > 0.0 else 1.0, slow / (step * widest) if step else 1.0)
+        found[joint] = max(least[joint] or 0.0, share * widest)
+    if widest not in found:
+        # What was only looked at is not kept.
+        stretch.forget_filtered({widest})
     return tuple(found)
 
 
@@ -71,7 +70,7 @@ def _narrowest(rate: float, bands: Bands) -> list[float | None]:
 
 
 def standstill(stretch: Stretch, motion: Motion, bands: Bands) -> NDArray[np.bool_]:
-    """Return where each joint stands still, shape (n, N), widened by the memory of the narrowest filter of positions.
+    """Return where each joint stands still, shape (n, N), widened by the memory of the position's filter.
 
     So is where it turns sharply, however fast: friction jumps there and the acceleration with it, and the filter, which
     rounds that off, moves the time of the turn. Where samples are few, so is every turn.
@@ -82,7 +81,7 @@ def standstill(stretch: Stretch, motion: Motion, bands: Bands) -> NDArray[np.boo
         # Where steps decide a joint goes to and fro, for half a period of the filter each way, however long that is.
         found |= slower(motion.v, np.where(stepping >= speeds, stepping, -1.0), stretch.rate, bands, longest=np.inf)
     least = _narrowest(stretch.rate, bands)
-    for own, v, a, cut, band in zip(found, motion.v, motion.a, least, bands, strict=True):
+    for own, v, a, cut, narrow, band in zip(found, motion.v, motion.a, motion.cuts, least, bands, strict=True):
         turns = np.flatnonzero(np.diff(np.signbit(v)) & ~own[:-1]) + 1
         few = band is not None and stretch.rate < FEW_SAMPLES * band
         if not len(turns) or (cut is None and not few):
@@ -92,7 +91,8 @@ def standstill(stretch: Stretch, motion: Motion, bands: Bands) -> NDArray[np.boo
         around = np.clip(turns[:, None] + np.arange(-widen, widen + 1), 0, len(v) - 1)
         if not few:
             # Beyond the least cut-off there is more noise than motion.
-            fast = (low_pass(a, stretch.rate, cut) - low_pass(a, stretch.rate, band))[around]
+            slow = a if cut == narrow else low_pass(a, stretch.rate, narrow)
+            fast = (slow - low_pass(a, stretch.rate, band))[around]
             sharp = np.ptp(fast, axis=1) > SHARP * np.max(np.abs(a[around]), axis=1)
             around = around[sharp]
         own[around] = True

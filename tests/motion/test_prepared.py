@@ -193,9 +193,9 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> Counter:
 
 
 def test_other_bands_share_what_does_not_depend_on_them(counted: Counter, run: Recording):
-    data = prepare([run], (6.0, 12.0))
-    _ = [part.motion for other in ((6.0, 12.0), (6.0, 8.0), (3.0, 12.0)) for part in data.at(other).stretches]
-    assert data.recordings[0].at((6.0, 12.0)) is data.recordings[0]
+    data = prepare([run], (9.0, 18.0))
+    _ = [part.motion for other in ((9.0, 18.0), (9.0, 12.0), (7.0, 18.0)) for part in data.at(other).stretches]
+    assert data.recordings[0].at((9.0, 18.0)) is data.recordings[0]
     assert max(counted.values()) == 1
     # One cut, and two cut-offs for each of the joints.
     assert len(counted) == 1 + 2 + 2
