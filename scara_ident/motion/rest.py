@@ -31,15 +31,16 @@ FEW_SAMPLES = 20.0
 FADE_PERIODS = 1.0
 # The noise of an unfiltered joint is what a filter at this share of the rate takes out.
 WIDE = 0.2
-# Neither is longer than this, s: in a narrow band too little would be left between turning points. So the low-pass has no longer
-# period either, as far as the noise of positions leaves what counts as rest as it is: where a joint breaks away or turns sharply it rings.
+# Neither is longer than this, s: in a narrow band too little would be left between turning points. So the low-pass of a joint that stands
+# and breaks away has no longer period either, as far as the noise of positions leaves what counts as rest as it is.
 LONGEST_WIDENING = 0.05
 
 
 def position_cuts(stretch: Stretch, bands: Bands) -> tuple[float | None, ...]:
     """Return the cut-offs, Hz, of a stretch's positions that go with some bands; None where the least is beyond half the rate.
 
-    One whose period is longer than both sides of the equation fade out is raised. The noise of a speed grows with the cut-off to the power
+    One whose period is longer than both sides of the equation fade out rings where a joint breaks away, and gives it a speed while it
+    stands: of one that stands for such a period it is raised. The noise of a speed grows with the cut-off to the power
     of 3/2, the speed at which an encoder's steps pass with the cut-off: it is raised as far as leaves both below the share of the peak
     speed that counts as rest.
     """
@@ -51,11 +52,15 @@ def position_cuts(stretch: Stretch, bands: Bands) -> tuple[float | None, ...]:
         return tuple(found)
     motion = motion_of(stretch, found)
     for joint in raised:
-        slow = REST_SHARE * float(np.max(np.abs(motion.v[joint])))
+        narrow, speed = least[joint] or 0.0, np.abs(motion.v[joint])
+        slow = REST_SHARE * float(np.max(speed))
         noise = REST_NOISE * velocity_noise(stretch, motion, joint, bands[joint], slow / REST_NOISE)
+        if all(stop - start < stretch.rate / narrow for start, stop in runs_of(speed <= noise)):
+            found[joint] = narrow
+            continue
         step = (stretch.steps[joint] if stretch.steps else None) or 0.0
         share = min((slow / noise) ** (2.0 / 3.0) if noise > 0.0 else 1.0, slow / (step * widest) if step else 1.0)
-        found[joint] = max(least[joint] or 0.0, share * widest)
+        found[joint] = max(narrow, share * widest)
     if widest not in found:
         # What was only looked at is not kept.
         stretch.forget_filtered({widest})
