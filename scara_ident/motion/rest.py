@@ -50,6 +50,7 @@ def position_cuts(stretch: Stretch, bands: Bands) -> tuple[float | None, ...]:
     raised = [joint for joint, cut in enumerate(least) if cut is not None and cut < widest]
     if not raised:
         return tuple(found)
+    # Kept, as other bands look at it too.
     motion = motion_of(stretch, found)
     for joint in raised:
         narrow, speed = least[joint] or 0.0, np.abs(motion.v[joint])
@@ -61,9 +62,6 @@ def position_cuts(stretch: Stretch, bands: Bands) -> tuple[float | None, ...]:
         step = (stretch.steps[joint] if stretch.steps else None) or 0.0
         share = min((slow / noise) ** (2.0 / 3.0) if noise > 0.0 else 1.0, slow / (step * widest) if step else 1.0)
         found[joint] = max(narrow, share * widest)
-    if widest not in found:
-        # What was only looked at is not kept.
-        stretch.forget_filtered({widest})
     return tuple(found)
 
 
