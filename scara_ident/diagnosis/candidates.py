@@ -219,13 +219,12 @@ class CandidateColumns:
 
     def leave(self) -> None:
         """Forget what only these bands have a use for, once a search goes on in others."""
-        below = {
-            cut for columns in self._at.values() for part in columns.observations.data.stretches for cut in part.cuts
-        }
+        # Of a joint that stands they may share a cut-off with bands below, see `position_cuts`.
+        below = [_cuts(columns.observations) - _cuts(self.observations) for columns in self._at.values()]
         self.lean()
         forget_noisier(self.observations.data)
         for part in self.observations.data.stretches:
-            part.stretch.forget_filtered(below)
+            part.stretch.forget_filtered(set().union(*below))
 
     def forget_all_but(self, *scenes: Scene) -> None:
         """Forget columns that follow other estimates than those of some scenes."""
@@ -241,6 +240,10 @@ class CandidateColumns:
         for held in (self._rows, self._raw):
             for key in [key for key in held if key[2] not in current]:
                 del held[key]
+
+
+def _cuts(observations: Observations) -> set[float | None]:
+    return {cut for part in observations.data.stretches for cut in part.cuts}
 
 
 def columns_at_hand(observations: Observations) -> dict[Motion, tuple[Array, ...]]:

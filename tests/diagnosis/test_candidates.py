@@ -188,15 +188,17 @@ def test_what_is_forgotten_to_save_memory_is_made_again_alike():
             assert_array_equal(rows, new[joint])
 
 
-def test_bands_that_are_left_take_what_only_they_needed_with_them():
+@pytest.mark.parametrize("lower", [(0.5, 0.5), (0.5, 1.0)])
+def test_bands_that_are_left_take_what_only_they_needed_with_them(lower):
     observations = observed(exact_runs()[:2])
     columns = CandidateColumns(observations)
-    below = columns.at(tuple(0.5 * band for band in observations.data.bands if band is not None))
+    bands = tuple(share * band for share, band in zip(lower, observations.data.bands, strict=True))
+    below = set(columns.at(bands).observations.data.stretches[0].cuts)
     drawn = noisier(observations.data)
-    part = observations.data.stretches[0].stretch
-    cuts = {cut for _, cut in part._filtered}
+    part = observations.data.stretches[0]
+    own = set(part.cuts)
+    cuts = {cut for _, cut in part.stretch._filtered}
     columns.leave()
-    left = {cut for _, cut in part._filtered}
-    assert left < cuts and not left & set(below.observations.data.stretches[0].cuts)
-    assert set(observations.data.stretches[0].cuts) <= left
+    left = {cut for _, cut in part.stretch._filtered}
+    assert left < cuts and own <= left and not left & (below - own)
     assert noisier(observations.data) is not drawn
