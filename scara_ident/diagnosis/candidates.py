@@ -141,7 +141,9 @@ class CandidateColumns:
             found = []
             for joint, (places, rows) in enumerate(effect.slopes(self._signals_of(scene, part), member)):
                 own = np.zeros((len(tie.slopes), len(part.kept[joint])))
-                own[places] = part.rows(joint, rows)
+                # A low-pass of no rows has no shape.
+                if len(places):
+                    own[places] = part.rows(joint, rows)
                 found.append(own)
             return found
 

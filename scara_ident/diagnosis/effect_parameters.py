@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
-from scara_ident.diagnosis.at_estimate import at_estimate
 from scara_ident.diagnosis.candidate_tests import examine
 from scara_ident.diagnosis.candidates import Candidate, Rows
 from scara_ident.diagnosis.linearised import Linearised, linearise, with_estimate_slopes
@@ -76,8 +75,6 @@ class LinearParameters(Coefficients):
 
     Attributes
     ----------
-    chosen : tuple of Candidate
-        The effects, whose nonlinear parameters go with coefficients where they are these once more.
     undetermined : ndarray of bool, shape (k,)
     std_kind : str
         How the covariance was found, see `scara_ident.estimation.covariance`.
@@ -85,7 +82,6 @@ class LinearParameters(Coefficients):
         By how much the noise of positions moves them, which is part of the covariance; None where negligible or not looked for.
     """
 
-    chosen: tuple[Candidate, ...]
     undetermined: NDArray[np.bool_]
     std_kind: str
     noise_bias: Array | None
@@ -132,10 +128,6 @@ def physical_parameters(step: SelectionStep, *, of_runs: bool = True, of_noise: 
     state = linearise(step)
     if of_runs or of_noise:
         state = with_estimate_slopes(step, state)
-        if state.following:
-            # Free until now they may be anywhere, and too far for one step.
-            step = replace(step, scene=at_estimate(step.scene, state.settled, state.value), chosen=state.settled)
-            state = with_estimate_slopes(step, linearise(step))
     spread, bias = _covariance(step, state, of_runs=of_runs, of_noise=of_noise)
     covariance = spread.matrix
     undetermined = merge([state.information, state.prior]).solve().undetermined
@@ -163,8 +155,7 @@ def physical_parameters(step: SelectionStep, *, of_runs: bool = True, of_noise: 
         found.append(parameters)
     own = slice(state.linear)
     linear = LinearParameters(
-        *(state.value, covariance[own, own], state.settled, undetermined[own], spread.kind),
-        None if bias is None else bias[own],
+        *(state.value, covariance[own, own], undetermined[own], spread.kind), None if bias is None else bias[own]
     )
     return PhysicalParameters(tuple(found), tuple(coefficients), _rotors(step, state, covariance), linear)
 

@@ -44,8 +44,6 @@ class Linearised:
         Of all weighted rows, with offsets of runs as noise; its parameters are k linear ones, then s nonlinear ones.
     ties : Information
         Rows that hold the coefficients of tied effects to what the nonlinear parameters and the rigid bodies say of them.
-    following : tuple of int
-        Which nonlinear parameters go with the coefficient that they are once more; all others stay where they are.
     """
 
     scene: Scene
@@ -55,7 +53,6 @@ class Linearised:
     joints: tuple[JointRows, ...]
     information: Information
     ties: Information
-    following: tuple[int, ...] = ()
 
     @property
     def linear(self) -> int:
@@ -69,7 +66,7 @@ class Linearised:
 
     @cached_property
     def best(self) -> Array:
-        """The same, and the change of the nonlinear ones, shape (k + s,)."""
+        """The same, and no change of the nonlinear ones, shape (k + s,)."""
         return _solved(self.information, self.ties, self._fitted)
 
     @cached_property
@@ -79,22 +76,11 @@ class Linearised:
 
     @property
     def _free(self) -> NDArray[np.bool_]:
-        return np.append(np.ones(self.linear, dtype=bool), np.isin(np.arange(len(self.unknowns)), self.following))
+        return np.arange(self.information.parameters) < self.linear
 
     @property
     def _fitted(self) -> NDArray[np.bool_]:
         return self._free & _left_in(self.chosen, self.places, self.information.parameters)
-
-    @property
-    def settled(self) -> tuple[Candidate, ...]:
-        """The effects with the nonlinear parameters that these have."""
-        chosen = list(self.chosen)
-        for k in self.following:
-            item = self.unknowns[k]
-            if item.owner is not None:
-                moved = item.moved(float(self.best[self.linear + k]))
-                chosen[item.owner] = moved_candidate(chosen[item.owner], item.place, moved)
-        return tuple(chosen)
 
     @cached_property
     def rows(self) -> int:
@@ -211,8 +197,6 @@ def linearise(step: SelectionStep) -> Linearised:
 def with_estimate_slopes(step: SelectionStep, state: Linearised) -> Linearised:
     """Return the model of a step, linear about the parameters of the base model too where columns follow these.
 
-    Nonlinear parameters that are a coefficient once more change with it: free, they may be one with what columns follow.
-
     Parameters
     ----------
     state : Linearised
@@ -224,16 +208,8 @@ def with_estimate_slopes(step: SelectionStep, state: Linearised) -> Linearised:
             joints = _with_slopes(joints, step.columns.estimate_slopes(scene, candidate, state.value[place]), 0, scene)
     if joints is state.joints:
         return state
-    rows, following = [], []
-    for k, item in enumerate(state.unknowns):
-        if item.owner is not None and step.chosen[item.owner].effect.nonlinear[item.place].of_coefficient:
-            row, column = np.zeros(state.information.parameters + 1), state.places[item.owner].start
-            row[[column, state.linear + k, -1]] = 1.0, -1.0, item.value
-            following.append(k)
-            rows.append(TIGHTNESS * _size(joints, column, step.weights) * row)
-    ties = merge([state.ties, Information(np.array(rows), 0.0)]) if rows else state.ties
     information = _pooled(joints, state.information.parameters, step.weights, step.offsets)
-    return replace(state, joints=joints, information=information, ties=ties, following=tuple(following))
+    return replace(state, joints=joints, information=information)
 
 
 def freed_model(step: SelectionStep) -> FittedModel:

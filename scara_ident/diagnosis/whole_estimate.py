@@ -37,9 +37,7 @@ def with_whole_estimate(outcome: Outcome, linear: LinearParameters) -> Outcome:
     followed = None
     if found.chosen:
         value, undetermined = linear.value[own], linear.undetermined[own]
-        chosen = linear.chosen[: len(found.chosen)]
-        scene = at_estimate(found.scene, chosen, value)
-        found = replace(found, step=replace(found.step, scene=scene, chosen=chosen))
+        found = replace(found, step=replace(found.step, scene=at_estimate(found.scene, found.chosen, value)))
         training = observed_at_every_sample(found.step)
     covariance = linear.covariance[own, own].copy()
     covariance[np.diag_indices_from(covariance)] = np.where(undetermined, np.inf, np.diag(covariance))

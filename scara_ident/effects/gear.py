@@ -8,9 +8,9 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.effects.effect import Effect
-from scara_ident.effects.following import EstimateSlopes, predicted_slopes, some_slopes
-from scara_ident.effects.links import usual_link_inertia
-from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, View
+from scara_ident.effects.following import Slopes
+from scara_ident.effects.links import rigid_rows, usual_link_inertia
+from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, Tie, View
 from scara_ident.effects.signals import Scene, Signals
 
 # A gear that loses more of the torque is broken.
@@ -29,13 +29,18 @@ def swinging_load(signals: Signals, joint: int) -> Array:
     return load + (link / (link + rotor) if link > 0.0 else 0.0) * swing
 
 
+def second_order(share: float) -> float:
+    """Return the gain of the transmitted torque that goes with a share lost, per share: half the share where it is small."""
+    return float(share / (1.0 + np.sqrt(1.0 + share**2)))
+
+
 class TransmissionLoss(Effect):
     """A share of the transmitted torque is lost in the gear, against the motion.
 
     With the efficiency eta the motor sees tau_l / eta when it drives and tau_l eta when it is driven, which is
     ``sqrt(1 + c^2) tau_l + c |tau_l| sign(v)`` with ``eta = sqrt(1 + c^2) - c`` and the transmitted torque tau_l, which
-    leaves out the own rotor's inertia. The first term is of second order; its c is a nonlinear parameter that meets
-    the coefficient when it is refined, so that no gain of this joint's torque is left over.
+    leaves out the own rotor's inertia. The first term is of second order; its c is a nonlinear parameter to which the
+    coefficient is tied: free, it would stand for a gain of this joint's torque.
 
     A load that swings fast about a small one loses the mean of its size, which is not the size of its mean: what the recorded torque
     has beyond the low-pass of the positions is in the first term; without a torque it is left out.
@@ -51,9 +56,10 @@ class TransmissionLoss(Effect):
             LARGEST_LOSS_SHARE, "over three quarters of the torque would be lost",
         ),
     )  # fmt: skip
-    nonlinear = (NonlinearParameter("_lost_share", "1", 0.005, LARGEST_LOSS_SHARE, of_coefficient=True),)
+    nonlinear = (NonlinearParameter("_lost_share", "1", 0.0, LARGEST_LOSS_SHARE),)
     at_rest = True
     follows_estimate = True
+    fitted_first = True
     of_load = True
     of_state = True
     watched = True
@@ -67,18 +73,25 @@ class TransmissionLoss(Effect):
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
         """Return ``|tau_l| sign(v)`` with its share of the second-order term."""
         j, share = member.place, member.nonlinear[0]
-        size = np.abs(swinging_load(signals, j))
-        return [size * signals.sign[j] + (np.sqrt(1.0 + share**2) - 1.0) / share * signals.load(j)]
+        return [np.abs(swinging_load(signals, j)) * signals.sign[j] + second_order(share) * signals.load(j)]
 
-    def estimate_slopes(self, signals: Signals, member: Member, value: Array) -> EstimateSlopes:
-        """Return those by the rigid bodies, which load the gear but for the own rotor; what else acts on links is held."""
+    def tie(self, scene: Scene, member: Member) -> Tie:
+        """Return the share that is lost."""
+        bodies = len(scene.model.rigid_body.columns)
+        return Tie(member.nonlinear[0], np.append(np.zeros(bodies + 1), 1.0))
+
+    def slopes(self, signals: Signals, member: Member) -> Iterable[Slopes]:
+        """Return the derivatives with the share that multiplies the column as it is; what else acts on links is held, and what swings."""
         j, share, scene = member.place, member.nonlinear[0], signals.scene
-        place = scene.model.place(scene.model.rigid_body)
-        bodies = np.arange(place.start, place.stop)
-        places, rows = some_slopes(predicted_slopes(signals, j), bodies)
-        rotor = scene.armature_slopes(j)[places - place.start, None] * scene.robot.row_scale[j] * signals.motion.a[j]
-        along = np.sign(swinging_load(signals, j)) * signals.sign[j] + (np.sqrt(1.0 + share**2) - 1.0) / share
-        return {j: (places, value[0] * along * (rows - rotor))}
+        along = np.sign(swinging_load(signals, j)) * signals.sign[j] + second_order(share)
+        by_rotor = -scene.robot.row_scale[j] * signals.motion.a[j]
+        term, root = scene.model.rigid_body, np.sqrt(1.0 + share**2)
+        bodies, armature = np.flatnonzero(term.pattern[j]), len(term.columns)
+        by_bodies = along * (rigid_rows(signals)[j] + scene.armature_slopes(j)[bodies, None] * by_rotor)
+        rows = np.vstack([by_bodies, along * by_rotor, signals.load(j) / (root * (1.0 + root))])
+        own = np.append(bodies, [armature, armature + 1]), share * rows
+        none = np.zeros(0, dtype=np.intp), np.zeros((0, len(by_rotor)))
+        return [own if k == j else none for k in range(scene.robot.n)]
 
     def geared_joint(self, member: Member) -> int:
         """Return its joint."""

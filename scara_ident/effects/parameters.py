@@ -54,8 +54,6 @@ class NonlinearParameter:
         Whether it is scanned and refined on a logarithmic scale.
     of_length : bool
         Whether it is a way of the joint: of one that slides ``lower`` and ``upper`` are multiples of `Scene.radian`.
-    of_coefficient : bool
-        Whether it is the effect's first coefficient once more: how unsure that is follows from both as one.
     told_as : float or None
         The power of it that the data tell, see `Parameter`; None for what it is refined in, its logarithm or itself.
     """
@@ -66,7 +64,6 @@ class NonlinearParameter:
     upper: float
     logarithmic: bool = True
     of_length: bool = False
-    of_coefficient: bool = False
     told_as: float | None = None
 
     def parameter(self, value: float, std: float, unit: str) -> Parameter:

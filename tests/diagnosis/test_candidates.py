@@ -150,6 +150,19 @@ def test_columns_of_a_load_are_made_again_where_what_acts_on_links_is_another(mo
     assert made[3:] == ["transmission_loss"]
 
 
+def test_slopes_are_those_of_the_rows_and_zero_on_joints_that_it_does_not_act_on(gapped: Observations):
+    scene = scene_on(gapped.model, wls(gapped).value, gapped)
+    columns, share, step = CandidateColumns(gapped), 0.2, 1e-4
+    candidate = Candidate(TransmissionLoss(), Member(1, (share,)))
+    none, own = columns.slopes(scene, candidate)
+    assert [len(slopes) for slopes in (none, own)] == [len(gapped.model.rigid_body.columns) + 2] * 2
+    assert none.shape[1] == gapped.joints[0].table.shape[1] and not np.any(none)
+    up, down = columns.rows(scene, [candidate.at([share + side * step]) for side in (1.0, -1.0)])
+    by_share = share * (up[1] - down[1])[0] / (2.0 * step)
+    # A difference errs by the square of its step.
+    assert_allclose(own[-1], by_share, rtol=0.0, atol=step**2 * np.max(np.abs(by_share)))
+
+
 def test_without_candidates_the_rows_are_those_of_the_model():
     seen = observed(exact_runs()[:1])
     for one, other in zip(with_columns(seen, []), seen.joints, strict=True):

@@ -264,16 +264,3 @@ def test_what_rows_leave_open_is_no_less_known_beside_what_was_taken_out_of_the_
     assert linear.value[-1] == 0.0
     std = np.sqrt(np.diag(linear.covariance))[:-1]
     assert std[told] == pytest.approx(start.std[told], rel=0.2)
-
-
-def test_what_goes_with_a_coefficient_is_that_coefficient_from_wherever_it_began() -> None:
-    """One with a load that is a mass alone it ended at its bound, and one step from there left a fifth more of the torque."""
-    shared = exact_runs()
-    ends = []
-    for start in (0.05, 0.75):
-        step = step_beside(shared, [Candidate(TransmissionLoss(), Member(1, (start,)))], WEIGHTS)
-        linear = physical_parameters(step).linear
-        assert linear is not None
-        assert linear.chosen[0].member.nonlinear[0] == pytest.approx(max(linear.value[-1], 0.005), abs=1e-6)
-        ends.append(linear.value / np.sqrt(np.diag(linear.covariance)))
-    assert ends[0] == pytest.approx(ends[1], abs=0.05)

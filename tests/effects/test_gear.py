@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from scara_ident.arrays import Array
 from scara_ident.effects import Member, Scene, Signals
-from scara_ident.effects.gear import TransmissionLoss, swinging_load
+from scara_ident.effects.gear import TransmissionLoss, second_order, swinging_load
 from scara_ident.effects.payload import PayloadChange
 from scara_ident.effects.position import Spring
 from scara_ident.effects.signals import LinkTorque
@@ -19,7 +21,7 @@ from scara_ident.robot.robot import load_robot
 from scara_ident.simulation import SimulationResult, simulate, virtual_arm
 from scara_ident.simulation import effects as fx
 from tests.effects.carried import ALWAYS
-from tests.effects.scenes import columns, scene_of
+from tests.effects.scenes import columns, dense, moving, scene_of
 from tests.effects.simulated import ARMS, arm_of, run, true_motion, true_scene
 from tests.simulation.made import left_over, swing
 
@@ -111,6 +113,43 @@ def test_a_gear_transmits_the_links_share_of_a_torque_that_swings_and_nothing_wi
     assert share == pytest.approx(beyond[0] @ beyond[1] / (beyond[1] @ beyond[1]), rel=0.25)
     for other in (motion.with_torque(None), replace(motion, cuts=()), replace(motion, cuts=(None, None))):
         assert np.array_equal(swinging_load(Signals(scene, other), 0), Signals(scene, other).load(0))
+
+
+@pytest.mark.parametrize("share", [0.0, 1e-6, 0.2, 0.75])
+def test_the_second_order_is_that_of_an_efficiency_however_small_the_share(share: float):
+    efficiency = np.sqrt(1.0 + share**2) - share
+    # The mean of what is driven and what drives.
+    assert 1.0 + share * second_order(share) == pytest.approx(0.5 * (efficiency + 1.0 / efficiency), rel=1e-15)
+    assert second_order(share) == pytest.approx(0.5 * share, rel=share**2)
+
+
+@pytest.mark.parametrize(("kind", "joint"), [("scara03", 0), ("ur5", 1)])
+def test_the_share_is_its_coefficient_and_slopes_are_the_differences_of_the_torque(kind: str, joint: int):
+    robot = load_robot() if kind == "scara03" else load_robot(kind)
+    scene, item = scene_of(robot), moving(robot, 0.3)
+    effect, bodies = TransmissionLoss(), len(scene.model.rigid_body.columns)
+    found = dense(effect.slopes(Signals(scene, item), Member(joint, (SHARE,))), bodies + 2)
+    tie = effect.tie(scene, Member(joint, (SHARE,)))
+    assert (tie.value, tie.slopes.tolist()) == (SHARE, [*[0.0] * (bodies + 1), 1.0])
+
+    def torque(at: Scene, share: float = SHARE) -> Array:
+        return SHARE * columns(effect, at, item, Member(joint, (share,)))[:, 0]
+
+    def difference(change: Callable[[float], Array], step: float = 1e-5) -> Array:
+        return (change(step) - change(-step)) / (2.0 * step)
+
+    expected = [
+        difference(lambda x, d=d: torque(replace(scene, value=scene.value + x * d)))
+        for d in np.eye(len(scene.value))[:bodies]
+    ]
+    own = scene.armature(joint)
+    expected.append(difference(lambda x: torque(replace(scene, armatures={joint: own + x}))))
+    expected.append(difference(lambda x: torque(scene, SHARE + x)))
+    size = np.max(np.abs(found), axis=(0, 2), keepdims=True)
+    # A load that changes its sign within a step differs.
+    wrong = np.abs(found - np.moveaxis(expected, 0, 1)) > 1e-6 * size
+    assert np.mean(wrong) < 1e-3
+    assert np.all(size[:, -2:] > 0.0)
 
 
 def test_what_no_gear_can_have_is_refused():
