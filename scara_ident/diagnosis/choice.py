@@ -89,7 +89,13 @@ def _soundest(
         )
         others = [replace(item, effect=other) for item in sure for other in item.effect.other_laws()]
         refined += step.refine(step.judge(others)) if others else []
-        pairs = [(step, item) for item in refined if item.accepted] + [pair for pair in leaders if pair[0] is not step]
+        fitted = [pair for pair in leaders if pair[0] is not step]
+        fitted += [
+            fitted_with(own, replace(item.candidate, effect=other), coarse=True)
+            for own, item in fitted
+            for other in item.candidate.effect.other_laws()
+        ]
+        pairs = [(step, item) for item in refined if item.accepted] + [pair for pair in fitted if pair[1].accepted]
         for own, decision in _intervals_last(best_first(pairs)):
             why = objection(own, decision)
             if why is not None and decision.candidate.effect.together and own.scene.together:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -34,6 +35,7 @@ def second_order(share: float) -> float:
     return float(share / (1.0 + np.sqrt(1.0 + share**2)))
 
 
+@dataclass(frozen=True)
 class TransmissionLoss(Effect):
     """A share of the transmitted torque is lost in the gear, against the motion.
 
@@ -46,6 +48,8 @@ class TransmissionLoss(Effect):
     has beyond the low-pass of the positions is in the first term; without a torque it is left out.
     Hamon, Gautier, Garrec (2011), "New dry friction model with load- and velocity-dependence".
     """
+
+    gain: float = 1.0
 
     name = "transmission_loss"
     summary = "gear loss that grows with the transmitted torque"
@@ -73,7 +77,7 @@ class TransmissionLoss(Effect):
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
         """Return ``|tau_l| sign(v)`` with its share of the second-order term."""
         j, share = member.place, member.nonlinear[0]
-        return [np.abs(swinging_load(signals, j)) * signals.sign[j] + second_order(share) * signals.load(j)]
+        return [np.abs(swinging_load(signals, j)) * signals.sign[j] + self.gain * second_order(share) * signals.load(j)]
 
     def tie(self, scene: Scene, member: Member) -> Tie:
         """Return the share that is lost."""
@@ -83,15 +87,19 @@ class TransmissionLoss(Effect):
     def slopes(self, signals: Signals, member: Member) -> Iterable[Slopes]:
         """Return the derivatives with the share that multiplies the column as it is; what else acts on links is held, and what swings."""
         j, share, scene = member.place, member.nonlinear[0], signals.scene
-        along = np.sign(swinging_load(signals, j)) * signals.sign[j] + second_order(share)
+        along = np.sign(swinging_load(signals, j)) * signals.sign[j] + self.gain * second_order(share)
         by_rotor = -scene.robot.row_scale[j] * signals.motion.a[j]
         term, root = scene.model.rigid_body, np.sqrt(1.0 + share**2)
         bodies, armature = np.flatnonzero(term.pattern[j]), len(term.columns)
         by_bodies = along * (rigid_rows(signals)[j] + scene.armature_slopes(j)[bodies, None] * by_rotor)
-        rows = np.vstack([by_bodies, along * by_rotor, signals.load(j) / (root * (1.0 + root))])
+        rows = np.vstack([by_bodies, along * by_rotor, self.gain * signals.load(j) / (root * (1.0 + root))])
         own = np.append(bodies, [armature, armature + 1]), share * rows
         none = np.zeros(0, dtype=np.intp), np.zeros((0, len(by_rotor)))
         return [own if k == j else none for k in range(scene.robot.n)]
+
+    def other_laws(self) -> tuple[Effect, ...]:
+        """Return the law without the gain of second order."""
+        return (TransmissionLoss(0.0),) if self.gain else ()
 
     def geared_joint(self, member: Member) -> int:
         """Return its joint."""
