@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from scara_ident.arrays import Array
 from scara_ident.effects.effect import Effect
 from scara_ident.effects.following import Slopes
 from scara_ident.effects.links import rigid_rows, usual_link_inertia
-from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, Tie, View
+from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, Parameter, Tie, View
 from scara_ident.effects.signals import Scene, Signals
 
 # A gear that loses more of the torque is broken.
@@ -47,9 +48,17 @@ class TransmissionLoss(Effect):
     A load that swings fast about a small one loses the mean of its size, which is not the size of its mean: what the recorded torque
     has beyond the low-pass of the positions is in the first term; without a torque it is left out.
     Hamon, Gautier, Garrec (2011), "New dry friction model with load- and velocity-dependence".
+
+    Where ``c |tau_l| sign(v)`` alone explains more, as large where the gear is driven as where it drives, it is by that, and
+    ``loss_order`` 1 is among the parameters: for a second order that is not there a scale of this joint's torque would make up.
+
+    Attributes
+    ----------
+    loss_order : {2, 1}
+        Up to which order of c there are terms: 1 without the gain of the transmitted torque.
     """
 
-    gain: float = 1.0
+    loss_order: Literal[1, 2] = 2
 
     name = "transmission_loss"
     summary = "gear loss that grows with the transmitted torque"
@@ -76,8 +85,8 @@ class TransmissionLoss(Effect):
 
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
         """Return ``|tau_l| sign(v)`` with its share of the second-order term."""
-        j, share = member.place, member.nonlinear[0]
-        return [np.abs(swinging_load(signals, j)) * signals.sign[j] + self.gain * second_order(share) * signals.load(j)]
+        j, gain = member.place, self._has_gain * second_order(member.nonlinear[0])
+        return [np.abs(swinging_load(signals, j)) * signals.sign[j] + gain * signals.load(j)]
 
     def tie(self, scene: Scene, member: Member) -> Tie:
         """Return the share that is lost."""
@@ -87,19 +96,34 @@ class TransmissionLoss(Effect):
     def slopes(self, signals: Signals, member: Member) -> Iterable[Slopes]:
         """Return the derivatives with the share that multiplies the column as it is; what else acts on links is held, and what swings."""
         j, share, scene = member.place, member.nonlinear[0], signals.scene
-        along = np.sign(swinging_load(signals, j)) * signals.sign[j] + self.gain * second_order(share)
+        along = np.sign(swinging_load(signals, j)) * signals.sign[j] + self._has_gain * second_order(share)
         by_rotor = -scene.robot.row_scale[j] * signals.motion.a[j]
         term, root = scene.model.rigid_body, np.sqrt(1.0 + share**2)
         bodies, armature = np.flatnonzero(term.pattern[j]), len(term.columns)
         by_bodies = along * (rigid_rows(signals)[j] + scene.armature_slopes(j)[bodies, None] * by_rotor)
-        rows = np.vstack([by_bodies, along * by_rotor, self.gain * signals.load(j) / (root * (1.0 + root))])
+        by_share = self._has_gain * signals.load(j) / (root * (1.0 + root))
+        rows = np.vstack([by_bodies, along * by_rotor, by_share])
         own = np.append(bodies, [armature, armature + 1]), share * rows
         none = np.zeros(0, dtype=np.intp), np.zeros((0, len(by_rotor)))
         return [own if k == j else none for k in range(scene.robot.n)]
 
     def other_laws(self) -> tuple[Effect, ...]:
-        """Return the law without the gain of second order."""
-        return (TransmissionLoss(0.0),) if self.gain else ()
+        """Return the law of the other order."""
+        return (TransmissionLoss(1 if self._has_gain else 2),)
+
+    def law(self) -> Mapping[str, Parameter]:
+        """Return the order where it is not 2."""
+        return {} if self._has_gain else {"loss_order": Parameter(float(self.loss_order), 0.0, "1")}
+
+    def description(self, scene: Scene, member: Member) -> str:
+        """Add the law where it is not that of the order 2."""
+        return super().description(scene, member) + (
+            "" if self._has_gain else ", as large where it is driven as where it drives"
+        )
+
+    @property
+    def _has_gain(self) -> bool:
+        return self.loss_order == 2
 
     def geared_joint(self, member: Member) -> int:
         """Return its joint."""

@@ -1,4 +1,4 @@
-"""Parameters of a law of friction, where another law explains as much and where it does not."""
+"""Parameters of a law of friction or of a gear's loss, where another law explains as much and where it does not."""
 
 from __future__ import annotations
 
@@ -10,14 +10,16 @@ from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.effect_parameters import physical_parameters
 from scara_ident.diagnosis.other_laws import parameters_of_laws
 from scara_ident.diagnosis.selection_step import SelectionStep
-from scara_ident.effects import Member
+from scara_ident.effects import Member, effects_named
 from scara_ident.effects.friction import Stribeck
+from scara_ident.effects.gear import TransmissionLoss
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import load_robot
-from tests.arms import noisy
+from tests.arms import noisy, rnea
 from tests.diagnosis.made import BANDS, NOISE, exact_runs, step_beside, with_torque
 
 AMPLITUDE, VELOCITY = 0.1, 0.15
+LOSS = 0.4
 WEIGHTS = 1.0 / np.array(NOISE)
 
 
@@ -67,3 +69,32 @@ def test_the_law_is_the_one_that_explains_more(exponent: int):
         found = effect.parameters[name]
         assert found.value == pytest.approx(true, abs=4.0 * found.std)
         assert found.std < 0.2 * true
+
+
+def runs_with_a_loss(order: int) -> list[Recording]:
+    """Recordings with a loss in the second gear by a law of this order, and three tenths of their noise once more."""
+    robot = load_robot()
+
+    def added(motion):
+        load = robot.row_scale[1] * rnea(robot, motion.q, motion.v, motion.a)[1]
+        gain = np.sqrt(1.0 + LOSS**2) - 1.0 if order == 2 else 0.0
+        return LOSS * np.abs(load) * np.sign(robot.drive_sign[1] * motion.v[1]) + gain * load
+
+    rng = np.random.default_rng(5)
+    return [noisy(run, rng, 0.3 * np.array(NOISE)) for run in with_torque(exact_runs(), 1, added)]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("order", [1, 2])
+def test_a_loss_is_by_the_law_that_explains_more_and_leaves_no_scale_of_the_torque(order: int):
+    """By the law of second order alone a scale of 1 - c^2 / 2 stood beside a loss without it."""
+    families = effects_named("transmission_loss", "torque_gain_mismatch")
+    found = diagnose(load_robot(), runs_with_a_loss(order), bands=BANDS, catalogue=families)
+    assert [(item.effect, item.joint) for item in found.effects] == [("transmission_loss", "joint2")]
+    assert [item.effect for item in found.search.chosen] == [TransmissionLoss(order)]
+    (effect,) = found.effects
+    assert ("loss_order" in effect.parameters) == (order == 1)
+    assert ("as large where it is driven" in effect.description) == (order == 1)
+    loss = effect.parameters["loss_coefficient"]
+    assert loss.value == pytest.approx(LOSS, abs=3.0 * loss.std)
+    assert loss.std < 0.1 * LOSS

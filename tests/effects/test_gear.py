@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -123,11 +124,14 @@ def test_the_second_order_is_that_of_an_efficiency_however_small_the_share(share
     assert second_order(share) == pytest.approx(0.5 * share, rel=share**2)
 
 
+@pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize(("kind", "joint"), [("scara03", 0), ("ur5", 1)])
-def test_the_share_is_its_coefficient_and_slopes_are_the_differences_of_the_torque(kind: str, joint: int):
+def test_the_share_is_its_coefficient_and_slopes_are_the_differences_of_the_torque(
+    kind: str, joint: int, order: Literal[1, 2]
+):
     robot = load_robot() if kind == "scara03" else load_robot(kind)
     scene, item = scene_of(robot), moving(robot, 0.3)
-    effect, bodies = TransmissionLoss(), len(scene.model.rigid_body.columns)
+    effect, bodies = TransmissionLoss(order), len(scene.model.rigid_body.columns)
     found = dense(effect.slopes(Signals(scene, item), Member(joint, (SHARE,))), bodies + 2)
     tie = effect.tie(scene, Member(joint, (SHARE,)))
     assert (tie.value, tie.slopes.tolist()) == (SHARE, [*[0.0] * (bodies + 1), 1.0])
@@ -149,7 +153,23 @@ def test_the_share_is_its_coefficient_and_slopes_are_the_differences_of_the_torq
     # A load that changes its sign within a step differs.
     wrong = np.abs(found - np.moveaxis(expected, 0, 1)) > 1e-6 * size
     assert np.mean(wrong) < 1e-3
-    assert np.all(size[:, -2:] > 0.0)
+    assert np.all(size[:, -2] > 0.0)
+    # By the law of first order the column is the same whatever the share.
+    assert np.all((size[:, -1] > 0.0) == (order == 2))
+
+
+def test_the_other_law_is_without_the_gain_and_says_so():
+    scene, item, member = scene_of(load_robot()), moving(load_robot(), 0.3), Member(1, (SHARE,))
+    own, (other,) = TransmissionLoss(), TransmissionLoss().other_laws()
+    assert other == TransmissionLoss(1) and other.other_laws() == (own,)
+    load = Signals(scene, item).load(1)
+    column = columns(other, scene, item, member)[:, 0]
+    assert np.abs(column[1]) == pytest.approx(np.abs(load))
+    assert columns(own, scene, item, member)[1, 0] - column[1] == pytest.approx(second_order(SHARE) * load, abs=1e-12)
+    assert own.law() == {}
+    assert (other.law()["loss_order"].value, other.law()["loss_order"].std) == (1.0, 0.0)
+    said = own.description(scene, member)
+    assert other.description(scene, member) == f"{said}, as large where it is driven as where it drives"
 
 
 def test_what_no_gear_can_have_is_refused():
