@@ -90,12 +90,8 @@ def _soundest(
         others = [replace(item, effect=other) for item in sure for other in item.effect.other_laws()]
         refined += step.refine(step.judge(others)) if others else []
         fitted = [pair for pair in leaders if pair[0] is not step]
-        fitted += [
-            fitted_with(own, replace(item.candidate, effect=other), coarse=True)
-            for own, item in fitted
-            for other in item.candidate.effect.other_laws()
-        ]
-        pairs = [(step, item) for item in refined if item.accepted] + [pair for pair in fitted if pair[1].accepted]
+        fitted += _by_other_laws(step, fitted)
+        pairs = [(step, item) for item in refined if item.accepted] + fitted
         for own, decision in _intervals_last(best_first(pairs)):
             why = objection(own, decision)
             if why is not None and decision.candidate.effect.together and own.scene.together:
@@ -107,6 +103,17 @@ def _soundest(
             refused[decision.label] = decision.refused(why)
         open_ = open_[len(leaders) :]
     return None
+
+
+def _by_other_laws(
+    step: SelectionStep, found: Sequence[tuple[SelectionStep, Decision]]
+) -> list[tuple[SelectionStep, Decision]]:
+    """Return those of some fits by another law of the last effect that are accepted: a law changes what all else is fitted to."""
+    pairs = [
+        (own, replace(item.candidate, effect=law)) for own, item in found for law in item.candidate.effect.other_laws()
+    ]
+    fitted = [fitted_with(own, candidate, coarse=True) for own, candidate in pairs]
+    return [(own, item) for own, item in fitted if _if_more(step, item).accepted]
 
 
 def _intervals_last(order: list[tuple[SelectionStep, Decision]]) -> list[tuple[SelectionStep, Decision]]:

@@ -11,6 +11,7 @@ import pytest
 
 from scara_ident.diagnosis.candidates import Candidate, CandidateColumns
 from scara_ident.diagnosis.choice import (
+    _by_other_laws,
     _each_fitted,
     _intervals_last,
     _least_left,
@@ -27,6 +28,7 @@ from scara_ident.diagnosis.selection_step import SelectionStep, moved_together
 from scara_ident.effects import Interval, Member
 from scara_ident.effects.elasticity import JointElasticity
 from scara_ident.effects.friction import Stribeck
+from scara_ident.effects.gear import TransmissionLoss
 from scara_ident.effects.measurement import TimeDelay, shifted
 from scara_ident.effects.payload import PayloadChange
 from scara_ident.effects.payload_intervals import PayloadInIntervals
@@ -120,6 +122,24 @@ def test_a_coarse_fit_that_seems_to_take_the_place_of_another_is_finished_first(
         ((_, decision),) = _each_fitted(None, [item], [item], None)
         assert decision.accepted == (len(coarse) > 1) and asked == coarse
         asked.clear()
+
+
+def test_what_was_fitted_is_fitted_by_its_other_law_from_there_and_left_out_where_that_is_refused(monkeypatch):
+    """A gear's loss without a gain of second order had one all the same, and a scale of the torque beside it."""
+    asked, module = [], sys.modules[fitted_beside.__module__]
+
+    def fitted(step, candidate, *, coarse=False):
+        asked.append((step, candidate, coarse))
+        return "refitted", SimpleNamespace(candidate=candidate, accepted=candidate.member.place == 1)
+
+    monkeypatch.setattr(module, "fitted_with", fitted)
+    monkeypatch.setattr(module, "_if_more", lambda step, decision: decision)
+    candidates = [Candidate(effect, Member(j, (0.2,))) for effect, j in ((TransmissionLoss(), 1), (Spring(), 1))]
+    candidates += [Candidate(TransmissionLoss(1), Member(0, (0.1,)))]
+    found = _by_other_laws(None, [(str(k), SimpleNamespace(candidate=item)) for k, item in enumerate(candidates)])
+    others = [replace(candidates[0], effect=TransmissionLoss(1)), replace(candidates[2], effect=TransmissionLoss())]
+    assert asked == [("0", others[0], True), ("2", others[1], True)]
+    assert [(own, item.candidate) for own, item in found] == [("refitted", others[0])]
 
 
 def test_of_the_same_effects_the_fit_that_leaves_least_is_taken_whatever_the_last_gains_in_it():
