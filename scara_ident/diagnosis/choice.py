@@ -92,7 +92,7 @@ def _soundest(
         fitted = [pair for pair in leaders if pair[0] is not step]
         fitted += _by_other_laws(step, fitted)
         pairs = [(step, item) for item in refined if item.accepted] + fitted
-        for own, decision in _intervals_last(best_first(pairs)):
+        for own, decision in _plainer_first(best_first(pairs)):
             why = objection(own, decision)
             if why is not None and decision.candidate.effect.together and own.scene.together:
                 # Beside others that it acts with a coarse fit ends early: what they took up of it goes back to it slowly.
@@ -116,24 +116,28 @@ def _by_other_laws(
     return [(own, item) for own, item in fitted if _if_more(step, item).accepted]
 
 
-def _intervals_last(order: list[tuple[SelectionStep, Decision]]) -> list[tuple[SelectionStep, Decision]]:
-    """Put what acts in intervals after the same effect without them where that leaves no more than chance makes.
+def _plainer_first(order: Sequence[tuple[SelectionStep, Decision]]) -> list[tuple[SelectionStep, Decision]]:
+    """Put the plainer of two of the same effect first where the other leaves no less than chance makes, see `_is_plainer`."""
+    left, put = list(order), []
+    while left:
+        plainer = [pair for pair in left[1:] if _is_plainer(pair[1], left[0][1]) and same(left[0], pair)]
+        first = plainer or left[:1]
+        put += first
+        left = [pair for pair in left if not any(pair is item for item in first)]
+    return put
 
-    Where intervals begin and end all rows told, those held out among them, so that what they remove there says too much.
+
+def _is_plainer(one: Decision, other: Decision) -> bool:
+    """Whether one of two of the same effect is without intervals, or by the law of its name.
+
+    Where intervals begin and end all rows told, those held out among them, so that what they remove there says too much. A
+    law is said, and has to be told.
     """
-    for place, (own, decision) in enumerate(order):
-        effect = decision.candidate.effect
-        if effect.in_intervals:
-            plainer = [
-                pair
-                for pair in order[place + 1 :]
-                if (other := pair[1].candidate.effect).name == effect.name
-                and not other.in_intervals
-                and same((own, decision), pair)
-            ]
-            rest = [pair for pair in order[place:] if pair not in plainer]
-            return [*order[:place], *plainer, *rest]
-    return order
+    effect, more = one.candidate.effect, other.candidate.effect
+    if effect.name != more.name:
+        return False
+    by_name = one.label == other.label and bool(more.law()) and not effect.law()
+    return by_name or (more.in_intervals and not effect.in_intervals)
 
 
 def _sure_once_refined(step: SelectionStep, best: Sequence[Decision], enough: float) -> list[Decision]:

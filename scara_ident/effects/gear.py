@@ -49,8 +49,9 @@ class TransmissionLoss(Effect):
     has beyond the low-pass of the positions is in the first term; without a torque it is left out.
     Hamon, Gautier, Garrec (2011), "New dry friction model with load- and velocity-dependence".
 
-    Where ``c |tau_l| sign(v)`` alone explains more, as large where the gear is driven as where it drives, it is by that, and
-    ``loss_order`` 1 is among the parameters: for a second order that is not there a scale of this joint's torque would make up.
+    Where ``c |tau_l| sign(v)`` alone explains more than chance makes, as large where the gear is driven as where it drives, it is
+    by that, and ``loss_order`` 1 is among the parameters: for a second order that is not there a scale of this joint's torque
+    would make up.
 
     Attributes
     ----------

@@ -13,9 +13,9 @@ from scara_ident.diagnosis.candidates import Candidate, CandidateColumns
 from scara_ident.diagnosis.choice import (
     _by_other_laws,
     _each_fitted,
-    _intervals_last,
     _least_left,
     _left_again,
+    _plainer_first,
     _sure_once_refined,
     _worth_fitting,
     choose,
@@ -163,8 +163,18 @@ def test_what_all_runs_take_up_at_one_time_is_no_list_of_intervals(last: float, 
     asked = [(PayloadInIntervals(), Member(None, intervals=intervals)), (PayloadChange(), Member(None, (4.0,)))]
     within, once, spring = step.judge([*(Candidate(*item) for item in asked), Candidate(Spring(), Member(0))])
     order = [(step, spring), (step, within), (step, once)]
-    assert _intervals_last(order) == ([order[0], order[2], order[1]] if plain else order)
-    assert _intervals_last([(step, once), (step, within)]) == [(step, once), (step, within)]
+    assert _plainer_first(order) == ([order[0], order[2], order[1]] if plain else order)
+    assert _plainer_first([(step, once), (step, within)]) == [(step, once), (step, within)]
+
+
+@pytest.mark.parametrize("alike", [True, False])
+def test_a_law_is_that_of_the_name_unless_it_is_told(alike: bool, monkeypatch):
+    """Of a gallery's gear with an efficiency the loss was by the law without, which left next to nothing less."""
+    monkeypatch.setattr(sys.modules[choose.__module__], "same", lambda own, other: alike)
+    laws = [(TransmissionLoss(1), "a1"), (TransmissionLoss(), "a2"), (Spring(), "b1"), (TransmissionLoss(), "a1")]
+    order = [(None, SimpleNamespace(candidate=Candidate(law, Member(0)), label=label)) for law, label in laws]
+    assert _plainer_first(order) == ([order[3], *order[:3]] if alike else order)
+    assert _plainer_first(order[::-1]) == order[::-1]
 
 
 @pytest.mark.parametrize(("left", "there"), [(0.02, True), (0.96, False)])
