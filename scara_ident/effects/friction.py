@@ -67,8 +67,8 @@ class Stribeck(Effect):
     """More friction at low speed: ``u = amplitude sign(v) exp(-(v/velocity)^2)``.
 
     Armstrong-Helouvry, Dupont, Canudas de Wit (1994), "A survey of models, analysis tools and compensation methods",
-    with both exponents in use. Where ``exp(-|v|/velocity)`` explains more, it is by that, and ``exponent`` 1 is among the
-    parameters. Amplitude and velocity rest on the law: where both explain as much, they are no surer than what the two
+    with both exponents in use. Where ``exp(-|v|/velocity)`` explains more than chance makes, it is by that, and ``exponent`` 1
+    is among the parameters. Amplitude and velocity rest on the law: where both explain as much, they are no surer than what the two
     differ by.
 
     Attributes
