@@ -92,14 +92,16 @@ def sentences(diagnosis: Diagnosis) -> tuple[str, ...]:
 
 
 def quantity(name: str, parameter: Parameter) -> str:
-    """Return a parameter in words, with its standard deviation, its interval or that nothing determines it."""
+    """Return a parameter in words, with its standard deviation if it has one, its interval or that nothing determines it."""
     unit = "" if parameter.unit == "1" else f" {parameter.unit}"
     interval = parameter.interval
     if interval is not None and np.any(np.isfinite(interval)):
         return f"{name} {_written(parameter.value, 4)}{unit} ({ends(interval)}, 95 %)"
     if interval is not None or not np.isfinite(parameter.std):
         return f"{name} about {parameter.value:.3g}{unit} (not told by recordings)"
-    return f"{name} {parameter.value:.3g} ± {parameter.std:.1g}{unit}"
+    # What says by which law an effect is has no uncertainty.
+    unsure = f" ± {parameter.std:.1g}" if parameter.std else ""
+    return f"{name} {parameter.value:.3g}{unsure}{unit}"
 
 
 def ends(interval: tuple[float, float]) -> str:

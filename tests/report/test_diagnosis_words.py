@@ -48,6 +48,10 @@ def test_an_interval_is_said_where_a_standard_deviation_says_too_little(std: flo
     assert quantity("stiffness", Parameter(3845.0, std, "N m/rad", told_as)) == said
 
 
+def test_what_says_the_law_has_no_uncertainty():
+    assert quantity("exponent", Parameter(1.0, 0.0, "1")) == "exponent 1"
+
+
 def test_where_it_cannot_be_told_the_first_sentence_says_so(result):
     unsure = replace(result.evidence[0], shown=False, by="", why="it is not white")
     undecided = replace(result, verdict="undecided", evidence=(unsure, result.evidence[1]), effects=())
