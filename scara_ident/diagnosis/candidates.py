@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.effects import Effect, EffectTerm, Member, Scene, Signals
@@ -131,37 +132,44 @@ class CandidateColumns:
         self._make(scene, [item for item in candidates if _key(scene, item) not in self._raw], keep=True)
         return [self._raw[_key(scene, item)] for item in candidates]
 
-    def slopes(self, scene: Scene, candidate: Candidate) -> tuple[Array, ...]:
-        """Return a tied candidate's `Effect.slopes` within the bands, shape (p + 1 + s, N) on the N rows of each joint."""
+    def slopes(self, scene: Scene, candidate: Candidate) -> Rows:
+        """Return a tied candidate's `Effect.slopes` within the bands, shape (p + 1 + s, N) on the N rows of each joint that has some."""
         effect, member = candidate.effect, candidate.member
         tie = effect.tie(scene, member)
         assert tie is not None
 
-        def on_stretch(part: PreparedStretch) -> list[Array]:
-            found = []
-            for joint, (places, rows) in enumerate(effect.slopes(self._signals_of(scene, part), member)):
-                own = np.zeros((len(tie.slopes), len(part.kept[joint])))
-                # A low-pass of no rows has no shape.
-                if len(places):
-                    own[places] = part.rows(joint, rows)
-                found.append(own)
-            return found
+        def on_stretch(part: PreparedStretch) -> dict[int, tuple[NDArray[np.intp], Array]]:
+            each = enumerate(effect.slopes(self._signals_of(scene, part), member))
+            return {joint: (places, part.rows(joint, rows)) for joint, (places, rows) in each if len(places)}
 
-        parts = [part for part in self.observations.data.stretches if part.usable]
-        return tuple(np.concatenate(own, axis=1) for own in zip(*side_by_side(on_stretch, parts), strict=True))
+        return self._joined(on_stretch, len(tie.slopes))
 
-    def estimate_slopes(self, scene: Scene, candidate: Candidate, value: Array) -> tuple[Array, ...]:
-        """Return an untied candidate's `Effect.estimate_slopes` within the bands, shape (p, N) on the N rows of each joint."""
+    def estimate_slopes(self, scene: Scene, candidate: Candidate, value: Array) -> Rows:
+        """Return an untied candidate's `Effect.estimate_slopes` within the bands, shape (p, N) on the N rows of each joint that has some."""
         effect, member = candidate.effect, candidate.member
 
-        def on_stretch(part: PreparedStretch) -> list[Array]:
-            found = [np.zeros((len(scene.value), len(own))) for own in part.kept]
-            for joint, (places, rows) in effect.estimate_slopes(self._signals_of(scene, part), member, value).items():
-                found[joint][places] = part.rows(joint, rows)
-            return found
+        def on_stretch(part: PreparedStretch) -> dict[int, tuple[NDArray[np.intp], Array]]:
+            each = effect.estimate_slopes(self._signals_of(scene, part), member, value).items()
+            return {joint: (places, part.rows(joint, rows)) for joint, (places, rows) in each}
 
+        return self._joined(on_stretch, len(scene.value))
+
+    def _joined(
+        self, on_stretch: Callable[[PreparedStretch], dict[int, tuple[NDArray[np.intp], Array]]], count: int
+    ) -> Rows:
+        """Return what there is of so many derivatives on every stretch, one after the other: of most joints there is nothing."""
         parts = [part for part in self.observations.data.stretches if part.usable]
-        return tuple(np.concatenate(own, axis=1) for own in zip(*side_by_side(on_stretch, parts), strict=True))
+        made = side_by_side(on_stretch, parts)
+        found: Rows = {}
+        for joint in dict.fromkeys(joint for each in made for joint in each):
+            found[joint] = np.zeros((count, sum(len(part.kept[joint]) for part in parts)))
+            stop = 0
+            for part, each in zip(parts, made, strict=True):
+                start, stop = stop, stop + len(part.kept[joint])
+                if joint in each:
+                    places, rows = each[joint]
+                    found[joint][places, start:stop] = rows
+        return found
 
     def predicted(self, scene: Scene, chosen: Sequence[Candidate], value: Array) -> tuple[Array, ...]:
         """Return the torque that the base model with effects predicts on every stretch, shape (n, N) each."""

@@ -174,14 +174,14 @@ def linearise(step: SelectionStep) -> Linearised:
     places = tuple(slice(int(a), int(b)) for a, b in zip(bounds[:-1], bounds[1:], strict=True))
     joints = with_columns(observations, own)
     linear, total = int(bounds[-1]), int(bounds[-1]) + len(unknowns)
-    slopes: dict[int, tuple[Array, ...]] = {}
+    slopes: dict[int, Rows] = {}
     ties = []
     for owner, candidate in enumerate(chosen):
         tie = candidate.effect.tie(scene, candidate.member)
         if tie is not None:
             slopes[owner] = columns.slopes(scene, candidate)
             place = scene.model.place(scene.model.rigid_body)
-            by_bodies = [own[: place.stop - place.start] for own in slopes[owner]]
+            by_bodies = {joint: own[: place.stop - place.start] for joint, own in slopes[owner].items()}
             joints = _with_slopes(joints, by_bodies, place.start, scene)
             size = _size(joints, int(bounds[owner]), weights)
             ties.append(TIGHTNESS * size * _tie_row(scene, chosen, unknowns, owner, tie, int(bounds[owner]), linear))
@@ -237,22 +237,24 @@ def _solved(information: Information, ties: Information, fitted: NDArray[np.bool
     return value
 
 
-def _with_slopes(
-    joints: Sequence[JointRows], slopes: Sequence[Array], start: int, scene: Scene
-) -> tuple[JointRows, ...]:
+def _with_slopes(joints: Sequence[JointRows], slopes: Rows, start: int, scene: Scene) -> tuple[JointRows, ...]:
     """Return rows whose columns of the base model have what an effect's torque changes by with its parameters.
 
     The torque has it too, at the present parameters, so that what is left stays what it is.
 
     Parameters
     ----------
-    slopes : sequence of ndarray, shape (k, N)
-        Of each joint, by k parameters of the base model.
+    slopes : dict of ndarray, shape (k, N)
+        Of each joint that has some, by k parameters of the base model.
     start : int
         Place of the first of these.
     """
     found = []
-    for rows, own in zip(joints, slopes, strict=True):
+    for joint, rows in enumerate(joints):
+        if joint not in slopes:
+            found.append(rows)
+            continue
+        own = slopes[joint]
         some = np.arange(start, start + len(own))
         missing = some[~np.isin(some, rows.columns) & np.any(own != 0.0, axis=1)]
         places = np.concatenate([rows.columns, missing])
@@ -316,7 +318,7 @@ def _change(
     item: Unknown,
     places: Sequence[slice],
     value: Array,
-    slopes: Mapping[int, tuple[Array, ...]],
+    slopes: Mapping[int, Rows],
 ) -> dict[int, Array]:
     """Return the change of each joint's torque per unit of a nonlinear parameter, shape (N,)."""
     total: dict[int, Array] = {}
@@ -326,7 +328,7 @@ def _change(
         if owner in slopes:
             which, factor = _slope_of(scene, chosen, item, owner)
             if which is not None:
-                for joint, own in enumerate(slopes[owner]):
+                for joint, own in slopes[owner].items():
                     total[joint] = total.get(joint, 0.0) + factor * own[which]
             continue
         sides: list[Rows] = []
