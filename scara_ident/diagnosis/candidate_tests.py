@@ -93,7 +93,7 @@ def examine(
 def coefficients(model: FittedModel, candidate: Rows, criteria: SelectionCriteria = CRITERIA) -> tuple[Array, Array]:
     """Return `Examination.value` and `Examination.products` of a candidate, without the work of a test."""
     columns = {joint: model.weights[joint] * rows for joint, rows in candidate.items()}
-    sums = sum(rows @ model.basis[joint].T for joint, rows in columns.items())
+    sums = np.sum([model.sums(joint, rows) for joint, rows in columns.items()], axis=0)
     squares = sum(rows @ rows.T for rows in columns.values())
     aim = sum(rows @ model.residual[joint] for joint, rows in columns.items())
     products = squares - sums @ sums.T

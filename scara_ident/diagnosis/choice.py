@@ -246,7 +246,8 @@ def fitted_with(step: SelectionStep, candidate: Candidate, *, coarse: bool = Fal
     """
     fitted = tune(replace(step, chosen=(*step.chosen, candidate)), coarse=coarse)
     own = fitted.without(len(step.chosen))
-    (decision,) = own.judge([fitted.chosen[-1]])
+    # What it is judged by is as large as all rows, and of several fits one is asked again: it goes with the copy.
+    (decision,) = replace(own).judge([fitted.chosen[-1]])
     return own, decision
 
 

@@ -56,27 +56,27 @@ class FittedModel:
         whole = weighted(side_by_side(lambda rows: rows.information(self.parameters), self.joints), self.weights)
         return orthonormal(whole.regressor_factor)
 
-    @cached_property
-    def basis(self) -> tuple[Array, ...]:
-        """The orthonormal columns on each joint's weighted rows, shape (r, N)."""
-        return tuple(
-            ((weight * self.root[rows.columns]).T @ rows.table[:-1])
-            for rows, weight in zip(self.joints, self.weights, strict=True)
-        )
+    def basis(self, joint: int) -> Array:
+        """Return the orthonormal columns on a joint's weighted rows, shape (r, N); not kept, as they are as large as the rows."""
+        rows = self.joints[joint]
+        return np.asarray((self.weights[joint] * self.root[rows.columns]).T @ rows.table[:-1])
+
+    def sums(self, joint: int, signals: Array) -> Array:
+        """Return the products of signals on a joint's weighted rows, shape (k, N), with the orthonormal columns, shape (k, r)."""
+        rows = self.joints[joint]
+        return np.asarray(signals @ rows.table[:-1].T @ (self.weights[joint] * self.root[rows.columns]))
 
     @cached_property
     def projected(self) -> Array:
         """The torque in the orthonormal columns, shape (r,)."""
-        parts = zip(self.joints, self.basis, self.weights, strict=True)
-        return np.asarray(np.sum([weight * (basis @ rows.table[-1]) for rows, basis, weight in parts], axis=0))
+        parts = enumerate(zip(self.joints, self.weights, strict=True))
+        return np.asarray(np.sum([weight * self.sums(j, rows.table[-1:])[0] for j, (rows, weight) in parts], axis=0))
 
     @cached_property
     def residual(self) -> tuple[Array, ...]:
         """Weighted residual of each joint's rows, shape (N,)."""
-        return tuple(
-            weight * rows.table[-1] - self.projected @ basis
-            for rows, basis, weight in zip(self.joints, self.basis, self.weights, strict=True)
-        )
+        value = self.root @ self.projected
+        return tuple(weight * rows.left(value) for rows, weight in zip(self.joints, self.weights, strict=True))
 
     @cached_property
     def in_blocks(self) -> tuple[NDArray[np.intp], ...]:
@@ -89,28 +89,29 @@ class FittedModel:
         return tuple(found)
 
     @cached_property
-    def basis_blocks(self) -> tuple[Array, ...]:
-        """The orthonormal columns by block, shape (blocks, m, r), zero where a block has no row."""
-        # Row by row, so that whole rows are copied.
-        return tuple(
-            np.concatenate([basis.T, np.zeros((1, len(basis)))])[places]
-            for basis, places in zip(self.basis, self.in_blocks, strict=True)
-        )
-
-    def rows_of(self, joints: tuple[int, ...]) -> tuple[Array, Array]:
-        """Return the orthonormal columns (blocks, m, r) and the residual (blocks, m) of joints by block, made once."""
-        if joints not in self._rows:
-            errors = [_by_block(self.residual[j], self.in_blocks[j]) for j in joints]
-            basis = [self.basis_blocks[j] for j in joints]
-            self._rows[joints] = (
-                np.concatenate(basis, axis=1) if len(joints) > 1 else basis[0],
-                np.concatenate(errors, axis=1),
-            )
-        return self._rows[joints]
+    def _stops(self) -> NDArray[np.intp]:
+        """Where the rows of each joint end in a block that has those of all, shape (n + 1,), the first of them 0."""
+        return np.cumsum([0, *(places.shape[1] for places in self.in_blocks)])
 
     @cached_property
-    def _rows(self) -> dict[tuple[int, ...], tuple[Array, Array]]:
-        return {}
+    def _together(self) -> tuple[Array, Array]:
+        """The orthonormal columns (blocks, m, r) and the residual (blocks, m) of all joints by block, zero where there is no row."""
+        blocks, size = len(self.owner), self.root.shape[1]
+        columns, errors = np.empty((blocks, self._stops[-1], size)), np.empty((blocks, self._stops[-1]))
+        for j, places in enumerate(self.in_blocks):
+            own = slice(*self._stops[j : j + 2])
+            # Row by row, so that whole rows are copied.
+            columns[:, own] = np.concatenate([self.basis(j).T, np.zeros((1, size))])[places]
+            errors[:, own] = _by_block(self.residual[j], places)
+        return columns, errors
+
+    def rows_of(self, joints: tuple[int, ...]) -> tuple[Array, Array]:
+        """Return the orthonormal columns (blocks, m, r) and the residual (blocks, m) of joints by block; of neighbours, a view."""
+        columns, errors = self._together
+        places = np.concatenate([np.arange(*self._stops[j : j + 2]) for j in joints])
+        # Most effects act on neighbours, and a copy for each of their sets would be most of what a search needs.
+        some = slice(places[0], places[-1] + 1) if np.all(np.diff(places) == 1) else places
+        return columns[:, some], errors[:, some]
 
     @cached_property
     def squares(self) -> Array:
@@ -121,7 +122,7 @@ class FittedModel:
     @cached_property
     def basis_products(self) -> Array:
         """Products of the orthonormal columns in every block, shape (blocks, r, r)."""
-        together, _ = self.rows_of(tuple(range(len(self.joints))))
+        together, _ = self._together
         found = np.empty((len(together), together.shape[2], together.shape[2]))
         # One after the other NumPy sees that a product with itself is symmetric.
         for rows, product in zip(together, found, strict=True):
@@ -166,9 +167,7 @@ class FittedModel:
     @cached_property
     def basis_scores(self) -> Array:
         """Products of the orthonormal columns with the residual in every block, shape (blocks, r)."""
-        parts = zip(self.basis_blocks, self.residual, self.in_blocks, strict=True)
-        found = [np.einsum("bmr,bm->br", basis, _by_block(error, places)) for basis, error, places in parts]
-        return np.asarray(np.sum(found, axis=0))
+        return np.asarray(np.einsum("bmr,bm->br", *self._together))
 
     def with_folds(self, fold: NDArray[np.intp]) -> FittedModel:
         """Return the same model with other folds, and with all that was made of it: nothing that is kept depends on them."""

@@ -54,12 +54,12 @@ def examine_rows(model: FittedModel, candidate: Rows, found: Examination) -> Exa
 def _by_rows(model: FittedModel, candidate: Rows, found: Examination) -> tuple[Array, float]:
     """Return the covariance of a candidate's coefficients from single rows, and its degrees of freedom."""
     weighted = {joint: model.weights[joint] * columns for joint, columns in candidate.items()}
-    sums = np.sum([columns @ model.basis[joint].T for joint, columns in weighted.items()], axis=0)
+    sums = np.sum([model.sums(joint, columns) for joint, columns in weighted.items()], axis=0)
     scatter = np.zeros_like(found.products)
     trace = norm = own = remembered = 0.0
     rows = sum(len(residual) for residual in model.residual)
-    for joint, (basis, residual) in enumerate(zip(model.basis, model.residual, strict=True)):
-        outside = weighted.get(joint, 0.0) - sums @ basis
+    for joint, residual in enumerate(model.residual):
+        outside = weighted.get(joint, 0.0) - sums @ model.basis(joint)
         along = found.value @ outside
         left = residual - along
         if not np.any(left) or not np.any(along):

@@ -39,7 +39,7 @@ def test_what_follows_from_blocks_is_what_follows_from_all_rows():
     model = model_of(slow(rng, 3, length, 8.0), rng.standard_normal(length), blocks)
     tried = slow(rng, k, length, 8.0) * np.repeat(rng.uniform(0.2, 3.0, blocks), ROWS)
     found = products_of(model, [{0: tried}])
-    basis, into = model.basis[0].T, np.linalg.inv(np.linalg.cholesky(np.sum(found.columns[0], axis=0))).T
+    basis, into = model.basis(0).T, np.linalg.inv(np.linalg.cholesky(np.sum(found.columns[0], axis=0))).T
     unit = replace(found, columns=into.T @ found.columns @ into, cross=into.T @ found.cross)
     weights = rng.uniform(0.1, 1.0, (1, blocks))
     result = weighted(model, unit, weights)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 
 from scara_ident.diagnosis.fitted_model import FittedModel, products_of
 from tests.diagnosis.made import dense_rows, uneven_blocks
@@ -19,7 +19,7 @@ def outer(one: np.ndarray, other: np.ndarray) -> np.ndarray:
 
 
 def basis_of(model: FittedModel) -> np.ndarray:
-    return np.concatenate(model.basis, axis=1).T
+    return np.concatenate([model.basis(joint) for joint in range(len(model.joints))], axis=1).T
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -67,12 +67,26 @@ def test_products_of_candidates_are_those_of_what_lies_outside_the_model(chosen:
         assert_allclose(found.scores[place_of] / np.sqrt(size), scores / np.sqrt(size), rtol=0, atol=1e-10)
 
 
+def test_rows_of_neighbours_are_those_of_all_and_take_no_memory():
+    model, _ = uneven_blocks(1)
+    count = len(model.joints)
+    columns, left = model.rows_of(tuple(range(count)))
+    assert_allclose(np.einsum("bmr,bm->br", columns, left), model.basis_scores, rtol=0, atol=1e-12)
+    assert_allclose(np.sum(left**2, axis=1), model.squares, rtol=1e-12)
+    for joints in ((0,), (1, 2), (0, 2)):
+        some, errors = model.rows_of(joints)
+        parts = [model.rows_of((j,)) for j in joints]
+        assert_array_equal(some, np.concatenate([part for part, _ in parts], axis=1))
+        assert_array_equal(errors, np.concatenate([error for _, error in parts], axis=1))
+        assert np.shares_memory(some, columns) == (joints != (0, 2))
+
+
 def test_a_block_without_a_row_of_a_joint_adds_nothing():
     model, candidates = uneven_blocks(2)
     found = products_of(model, [candidates[0]])
     empty = np.diff(model.joints[0].starts) == 0
     assert np.any(empty)
-    assert not np.any(model.basis_blocks[0][empty])
+    assert not np.any(model.rows_of((0,))[0][empty])
     # The candidate acts on the first joint only: what is left of it elsewhere is the model's answer to it.
     _, place = dense_rows(model, candidates[0])
     answer = basis_of(model) @ found.sums[0].T
