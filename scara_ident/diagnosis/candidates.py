@@ -139,8 +139,9 @@ class CandidateColumns:
         assert tie is not None
 
         def on_stretch(part: PreparedStretch) -> dict[int, tuple[NDArray[np.intp], Array]]:
-            each = enumerate(effect.slopes(self._signals_of(scene, part), member))
-            return {joint: (places, part.rows(joint, rows)) for joint, (places, rows) in each if len(places)}
+            every = part.decimation if effect.smooth else 1
+            each = enumerate(effect.slopes(self._signals_of(scene, part, smooth=effect.smooth), member))
+            return {joint: (places, part.rows(joint, rows, every)) for joint, (places, rows) in each if len(places)}
 
         return self._joined(on_stretch, len(tie.slopes))
 
@@ -190,7 +191,7 @@ class CandidateColumns:
         stretches = self.observations.data.stretches
 
         def on_stretch(part: PreparedStretch) -> tuple[list[Rows], list[Rows]]:
-            return _on_stretch(self._signals_of(scene, part), wanted, part, keep=keep)
+            return self._on_stretch(scene, wanted, part, keep=keep)
 
         if len(wanted) < WORTH_A_PROCESS:
             made = list(map(on_stretch, stretches))
@@ -204,16 +205,66 @@ class CandidateColumns:
             if keep:
                 self._raw[key] = tuple(raws[k] for _, raws in made)
 
-    def _signals_of(self, scene: Scene, part: PreparedStretch) -> Signals:
-        """Return the signals of a stretch; those of the last estimate are kept with all that was made of them."""
-        held = self._signals.get(part.motion)
+    def _on_stretch(
+        self, scene: Scene, candidates: Sequence[Candidate], part: PreparedStretch, *, keep: bool
+    ) -> tuple[list[Rows], list[Rows]]:
+        """Return every candidate's columns within the bands and, if they are to be kept, as they are."""
+        kept: list[Rows] = [{} for _ in candidates]
+        unfiltered: list[Rows] = [{} for _ in candidates]
+        # By how many samples one stands for: candidate, joint, and columns that have not passed the low-pass yet.
+        waiting: dict[int, list[tuple[int, int, list[Array]]]] = {}
+
+        def flush() -> None:
+            for every, items in waiting.items():
+                rows = iter(part.rows_of([(joint, column) for _, joint, columns in items for column in columns], every))
+                for k, joint, columns in items:
+                    kept[k][joint] = np.array([next(rows) for _ in columns])
+            waiting.clear()
+
+        count = 0
+        for k, candidate in enumerate(candidates):
+            every = part.decimation if candidate.effect.smooth and part.usable else 1
+            if keep or every == 1:
+                made = candidate.effect.by_joint(self._signals_of(scene, part), candidate.member)
+                if keep:
+                    unfiltered[k] = {joint: np.array(columns) for joint, columns in made.items()}
+            if every > 1:
+                made = candidate.effect.by_joint(self._signals_of(scene, part, smooth=True), candidate.member)
+            for joint, columns in made.items():
+                if part.usable:
+                    waiting.setdefault(every, []).append((k, joint, columns))
+                    count += len(columns)
+                else:
+                    kept[k][joint] = np.zeros((len(columns), 0))
+            if count >= AT_ONCE:
+                flush()
+                count = 0
+        flush()
+        return kept, unfiltered
+
+    def _signals_of(self, scene: Scene, part: PreparedStretch, *, smooth: bool = False) -> Signals:
+        """Return the signals of a stretch, or of its decimated motion; those of the last estimate are kept with all that was made."""
+        motion = part.decimated if smooth else part.motion
+        held = self._signals.get(motion)
         if held is None:
             # A scene knows the columns of the motions that it was made from, not with what has been corrected since.
-            held = Signals(scene, part.motion).with_made(columns=self._at_hand[part.motion])
+            columns = self._at_hand[part.motion]
+            if motion is not part.motion:
+                columns = tuple(self._decimated(part, joint, own) for joint, own in enumerate(columns))
+            held = Signals(scene, motion).with_made(columns=columns)
         elif held.scene is not scene:
             held = held.at(scene)
-        self._signals[part.motion] = held
+        self._signals[motion] = held
         return held
+
+    def _decimated(self, part: PreparedStretch, joint: int, columns: Array) -> Array:
+        """Return the base model's columns on a joint at the samples of `PreparedStretch.decimated`: friction jumps between them."""
+        model = self.observations.model
+        place, own = model.place(model.rigid_body), model.active[joint]
+        smooth = (own >= place.start) & (own < place.stop)
+        found = np.ascontiguousarray(columns[:, :: part.decimation])
+        found[~smooth] = part.decimate(columns[~smooth])
+        return found
 
     @cached_property
     def _at_hand(self) -> dict[Motion, tuple[Array, ...]]:
@@ -223,9 +274,9 @@ class CandidateColumns:
         """Forget what is as large as the columns and made again where it is asked for, once a search goes on with others."""
         self.__dict__.pop("noisier", None)
         self._at.clear()
+        for motion in (*(part.motion for part in self.observations.data.stretches), *self._signals):
+            forget_shared(motion)
         self._signals.clear()
-        for part in self.observations.data.stretches:
-            forget_shared(part.motion)
 
     def leave(self) -> None:
         """Forget what only these bands have a use for, once a search goes on in others."""
@@ -276,38 +327,6 @@ def _key(scene: Scene, candidate: Candidate) -> Key:
     alone = not effect.together or set(scene.together) <= {(effect, member)}
     together = () if alone else scene.together
     return effect, member, _estimate(scene, on_links, together)
-
-
-def _on_stretch(
-    signals: Signals, candidates: Sequence[Candidate], part: PreparedStretch, *, keep: bool
-) -> tuple[list[Rows], list[Rows]]:
-    """Return every candidate's columns within the bands and, if they are to be kept, as they are."""
-    kept: list[Rows] = [{} for _ in candidates]
-    unfiltered: list[Rows] = [{} for _ in candidates]
-    # Candidate, joint, and columns that have not passed the low-pass yet.
-    waiting: list[tuple[int, int, list[Array]]] = []
-
-    def flush() -> None:
-        rows = iter(part.rows_of([(joint, column) for _, joint, columns in waiting for column in columns]))
-        for k, joint, columns in waiting:
-            kept[k][joint] = np.array([next(rows) for _ in columns])
-        waiting.clear()
-
-    count = 0
-    for k, candidate in enumerate(candidates):
-        for joint, columns in candidate.effect.by_joint(signals, candidate.member).items():
-            if keep:
-                unfiltered[k][joint] = np.array(columns)
-            if part.usable:
-                waiting.append((k, joint, columns))
-                count += len(columns)
-            else:
-                kept[k][joint] = np.zeros((len(columns), 0))
-        if count >= AT_ONCE:
-            flush()
-            count = 0
-    flush()
-    return kept, unfiltered
 
 
 def with_columns(observations: Observations, added: Sequence[Rows]) -> tuple[JointRows, ...]:

@@ -85,6 +85,9 @@ class Effect(ABC):
     of_state : bool
         Whether the columns at a sample follow from position, velocity and acceleration there, by numpy's arithmetic, sin,
         cos, exp, abs and sign alone, so that code for a controller can have them.
+    smooth : bool
+        Whether the columns have nothing faster than the filtered motion, as a jump of friction is, so that fewer samples are
+        enough of them within the band: they are then made at these, see `PreparedStretch.decimated`.
     seeded_by : {"order", "frequency"} or None
         The lines of a residual's spectrum that suggest a member; see `seeds`.
     watched : bool
@@ -115,6 +118,7 @@ class Effect(ABC):
     same_at_all_frequencies: ClassVar[bool] = False
     in_small_ways: ClassVar[bool] = False
     of_state: ClassVar[bool] = False
+    smooth: ClassVar[bool] = False
     seeded_by: ClassVar[Literal["order", "frequency"] | None] = None
     watched: ClassVar[bool] = False
     view: ClassVar[View] = OWN

@@ -91,6 +91,7 @@ class JointElasticity(BehindGear):
     )
     fitted_first = True
     together = True
+    smooth = True
     view = View("acceleration")
     experiment = "excite above 5 Hz with short steps, and look for a resonance that stays at its frequency"
 

@@ -76,6 +76,13 @@ class Motion(Frozen):
         vars(found)["_same"] = self.kinematics
         return found
 
+    def decimated(self, every: int, torque: Array | None) -> Motion:
+        """Return every so many samples, from the first on, with the torque given at these, shape (n, ceil(N / every))."""
+        q, v, a = (np.ascontiguousarray(part[:, ::every]) for part in (self.q, self.v, self.a))
+        fade = None if self.fade is None else np.ascontiguousarray(self.fade[:, ::every])
+        time = self.time[::every]
+        return Motion(self.name, self.trajectory, time, q, v, a, torque, self.rate / every, fade, self.cuts)
+
     def part(self, start: int, stop: int) -> Motion:
         """Return the samples from ``start`` to before ``stop``."""
         window = slice(start, stop)

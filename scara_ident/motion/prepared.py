@@ -18,16 +18,19 @@ from numpy.typing import NDArray
 from scara_ident.arrays import Array
 from scara_ident.errors import UsageError
 from scara_ident.manners import Frozen
-from scara_ident.motion.low_pass import ROWS_AT_ONCE, low_pass, low_pass_every
+from scara_ident.motion.low_pass import HIGHEST_CUT, ROWS_AT_ONCE, low_pass, low_pass_every
 from scara_ident.motion.motion import Motion, Stretch, motion_of, stretches, torque_of, with_effort_of
 from scara_ident.motion.periods import Periods, periods_of
-from scara_ident.motion.rest import Bands, fading, position_cuts, standstill
+from scara_ident.motion.rest import FEW_SAMPLES, Bands, fading, position_cuts, standstill
 from scara_ident.motion.trajectories import Trajectories, trajectories_of
 from scara_ident.recording.recording import Recording
 from scara_ident.threads import made_once, side_by_side
 
 # Rows per period of the band that are kept: the filter lets little through above 1.25 of its cut-off.
 ROWS_PER_PERIOD = 2.5
+# Samples per period of the band that are enough of what follows from the motion smoothly, which has passed a low-pass of three times the
+# band: as few as leave every turn of a joint as it is, see `FEW_SAMPLES`.
+SMOOTH_PER_PERIOD = FEW_SAMPLES
 # Periods of the band left out at both ends of a stretch, where the filter's continuation is a guess, and the least
 # number of samples, where an unfiltered derivative rings.
 END_PERIODS = 1.0
@@ -81,9 +84,11 @@ class PreparedStretch:
 
     def with_torque_of(self, stretch: Stretch) -> PreparedStretch:
         """Return it with a stretch that differs by its torque alone; what the motion decides is shared."""
-        shared = {name: made for name, made in self.__dict__.items() if name != "stretch"}
+        shared = {name: made for name, made in self.__dict__.items() if name not in ("stretch", "decimated")}
         found = replace(self, stretch=stretch)
         found.__dict__.update(shared, motion=self.motion.with_torque(stretch.torque))
+        if "decimated" in self.__dict__ and self.decimation > 1:
+            found.__dict__["decimated"] = self.decimated.with_torque(found._decimated_torque())
         return found
 
     def with_positions_of(self, stretch: Stretch, factor: Array, shift: Array) -> PreparedStretch:
@@ -100,6 +105,7 @@ class PreparedStretch:
             torque=stretch.torque,
         )
         found = self.with_torque_of(stretch)
+        found.__dict__.pop("decimated", None)
         found.__dict__.update(motion=moved)
         return found
 
@@ -161,6 +167,28 @@ class PreparedStretch:
         return tuple(row_step(self.rate, band) for band in self.bands)
 
     @made_once
+    def decimation(self) -> int:
+        """How many samples one of `decimated` stands for: as many as the band allows of which every step is a multiple."""
+        widest = max(np.inf if band is None else band for band in self.bands)
+        most = int(self.rate / (SMOOTH_PER_PERIOD * widest) * (1.0 + ROUNDING))
+        return max((every for every in range(2, most + 1) if not any(step % every for step in self.steps)), default=1)
+
+    @made_once
+    def decimated(self) -> Motion:
+        """The motion at as many samples as what follows from it smoothly needs within the bands; often itself."""
+        every = self.decimation
+        if every == 1:
+            return self.motion
+        return self.motion.decimated(every, self._decimated_torque())
+
+    def _decimated_torque(self) -> Array | None:
+        return None if self.motion.torque is None else self.decimate(self.motion.torque)
+
+    def decimate(self, signals: Array) -> Array:
+        """Return signals (k, N) at as few samples as `decimated` has, without what is faster, which would come back as something slow."""
+        return low_pass_every(signals, self.rate, HIGHEST_CUT * self.rate / self.decimation, self.decimation)
+
+    @made_once
     def blocks(self) -> NDArray[np.intp]:
         """Bounds of the blocks of time, samples, shape (blocks + 1,)."""
         length = max(1, int(self.rate * block_seconds(self.bands) * (1.0 + ROUNDING)))
@@ -176,7 +204,7 @@ class PreparedStretch:
         """Return where each block begins among the kept rows of a joint, shape (blocks + 1,)."""
         return np.asarray(np.searchsorted(self.kept[joint], self.blocks), dtype=np.intp)
 
-    def rows(self, joint: int, signals: Array) -> Array:
+    def rows(self, joint: int, signals: Array, every: int = 1) -> Array:
         """Return signals within a joint's band at its kept samples, weighted to stand for all samples, shape (k, K).
 
         Parameters
@@ -184,21 +212,24 @@ class PreparedStretch:
         joint : int
         signals : ndarray, shape (k, N)
             Columns of the joint's equation, or its torque.
+        every : int, optional
+            They are given at every so many samples, 1 or `decimation`.
         """
-        step, band = self.steps[joint], self.bands[joint]
-        rows = low_pass_every(signals, self.rate, band, step, self.fade[joint]).take(self.kept[joint] // step, axis=1)
+        step, band, fade = self.steps[joint], self.bands[joint], self.fade[joint, ::every]
+        rows = low_pass_every(signals, self.rate / every, band, step // every, fade)
+        rows = rows.take(self.kept[joint] // step, axis=1)
         rows *= np.sqrt(step)
         return rows
 
-    def rows_of(self, signals: Sequence[tuple[int, Array]]) -> list[Array]:
-        """Return what `rows` does of single signals (N,), each given with its joint; those of a joint pass the filter together."""
+    def rows_of(self, signals: Sequence[tuple[int, Array]], every: int = 1) -> list[Array]:
+        """Return what `rows` does of single signals, each given with its joint; those of a joint pass the filter together."""
         own = [[place for place, (k, _) in enumerate(signals) if k == joint] for joint in range(len(self.bands))]
         parts = [part[k : k + ROWS_AT_ONCE] for part in own for k in range(0, len(part), ROWS_AT_ONCE)]
         # Made once, and not in two threads.
         _ = self.fade, self.kept
 
         def passed(places: list[int]) -> Array:
-            return self.rows(signals[places[0]][0], np.array([signals[place][1] for place in places]))
+            return self.rows(signals[places[0]][0], np.array([signals[place][1] for place in places]), every)
 
         made = side_by_side(passed, parts) if len(parts) > 1 else [passed(places) for places in parts]
         found = dict(zip(chain.from_iterable(parts), chain.from_iterable(made), strict=True))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -11,7 +12,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scara_ident import processes
 from scara_ident.diagnosis.candidates import WORTH_A_PROCESS, Candidate, CandidateColumns, with_columns
 from scara_ident.diagnosis.search import scene_of as scene_on
+from scara_ident.diagnosis.selection_step import together_of
 from scara_ident.effects import CATALOGUE, Member
+from scara_ident.effects.elasticity import JointElasticity
 from scara_ident.effects.friction import FrictionCoupling, Stribeck
 from scara_ident.effects.gear import TransmissionLoss
 from scara_ident.effects.position import Spring
@@ -82,6 +85,48 @@ def test_columns_of_the_catalogue_are_those_of_the_model_with_them_as_terms(gapp
         assert_array_equal(one.counts, other.counts)
         size = np.maximum(np.max(np.abs(other.table), axis=1, keepdims=True), 1e-12)
         assert_allclose(one.table / size, other.table / size, rtol=0, atol=1e-12)
+
+
+def test_columns_and_slopes_of_what_is_smooth_are_those_of_all_samples(monkeypatch: pytest.MonkeyPatch):
+    # Rows of 16 samples each, of which two are as good as one.
+    seen = observed(exact_runs()[:2], (6.2, 6.2))
+    assert [part.decimation for part in seen.data.stretches] == [2, 2]
+    scene = scene_on(seen.model, wls(seen).value, seen)
+    ends = [list(pairwise(np.cumsum([0, *(len(part.kept[j]) for part in seen.data.stretches)]))) for j in range(2)]
+    # From well within the band to where the highest is tried, and two that act together.
+    for chosen in (
+        [Candidate(JointElasticity(), Member(1, (4.0, 0.05)))],
+        [Candidate(JointElasticity(), Member(0, (24.0, 0.2)))],
+        [Candidate(JointElasticity(), Member(j, (10.0, 0.2))) for j in (0, 1)],
+    ):
+        given = replace(scene, together=together_of(chosen))
+        few = CandidateColumns(seen)
+        rows, slopes = few.rows(given, chosen), [few.slopes(given, item) for item in chosen]
+        with monkeypatch.context() as patch:
+            patch.setattr(JointElasticity, "smooth", False)
+            full = CandidateColumns(seen)
+            wanted = full.rows(given, chosen)
+            expected = [full.slopes(given, item) for item in chosen]
+            # At every sample they are given as they are.
+            raw = full.raw(given, chosen)
+        pairs = [(one, other, 0.01) for one, other in zip(rows, wanted, strict=True)]
+        # A fit goes by its derivatives, and ends where the columns themselves say.
+        pairs += [(one, other, 0.1) for one, other in zip(slopes, expected, strict=True)]
+        for one, other, least in pairs:
+            assert one.keys() == other.keys()
+            for joint in one:
+                # Both filters continue what they have from the first sample and the last, for which they have not the same, and how
+                # a link swung at the beginning is read from the noise there: without damping for long.
+                inner = np.concatenate([np.arange(a + 12, b - 12) for a, b in ends[joint]])
+                size = np.sqrt(np.mean(other[joint][:, inner] ** 2, axis=1))
+                apart = np.sqrt(np.mean((one[joint] - other[joint])[:, inner] ** 2, axis=1))
+                assert np.all(apart <= least * size + 1e-3 * least * np.max(size))
+        for one, other in zip(few.raw(given, chosen), raw, strict=True):
+            for part, same in zip(one, other, strict=True):
+                assert all(np.array_equal(part[joint], same[joint]) for joint in same)
+        # Asked for at every sample, those within the band stay what they are.
+        again = few.rows(given, chosen)
+        assert all(np.array_equal(a[joint], b[joint]) for a, b in zip(again, rows, strict=True) for joint in b)
 
 
 def test_the_predicted_torque_is_that_of_the_model_with_them_as_terms(gapped: Observations):

@@ -16,7 +16,7 @@ from scara_ident.identification.identify import identify
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.low_pass import low_pass
 from scara_ident.motion.motion import stretches
-from scara_ident.motion.prepared import BLOCK_SECONDS, PreparedStretch, prepare, row_step
+from scara_ident.motion.prepared import BLOCK_SECONDS, SMOOTH_PER_PERIOD, PreparedStretch, prepare, row_step
 from scara_ident.recording.audit import Finding
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import Robot, load_robot
@@ -24,6 +24,8 @@ from tests.arms import PLANAR_2R, swing, write_urdf
 
 RATE = 500.0
 BANDS = (10.0, 10.0)
+# In these all rows are multiples of six samples, which are enough for what is smooth.
+BELOW = (2.75, 4.1)
 
 
 @pytest.fixture(scope="module")
@@ -49,6 +51,49 @@ def test_rows_are_the_low_pass_at_the_kept_samples_weighted_to_stand_for_all(run
         assert_allclose(part.smooth(j, signals), smooth, rtol=0, atol=1e-11)
         expected = np.sqrt(part.steps[j]) * smooth[:, part.kept[j]]
         assert_allclose(part.rows(j, signals), expected, rtol=0, atol=1e-11 * np.max(np.abs(smooth)))
+
+
+def test_fewer_samples_of_what_is_smooth_give_the_same_rows(run: Recording):
+    part = only(run, BELOW)
+    every = part.decimation
+    assert (part.steps, every, int(RATE / (SMOOTH_PER_PERIOD * BELOW[1]))) == ((72, 48), 6, 6)
+    # Steps of 80 and 57 samples have no common part, and without a band nothing is left out.
+    assert only(run, (2.5, 3.5)).decimation == 1 and only(run, (2.5, None)).decimation == 1
+    time, random = np.arange(part.samples) / RATE, np.random.default_rng(0)
+    # Up to where the low-pass of the positions ends, and some of it beyond.
+    frequency, angle = np.array([[0.3], [1.1], [3.9], [9.0], [14.0]]), random.uniform(0.0, 2.0 * np.pi, (5, 1))
+    signals = random.standard_normal((3, 5)) @ np.sin(2.0 * np.pi * frequency * time + angle)
+    whole = only(run, BELOW)
+    vars(whole)["rest"] = np.zeros((2, whole.samples), dtype=bool)
+    vars(whole)["fade"] = np.ones((2, whole.samples))
+    # Towards the end the filter continues a signal from its last sample, and the fade towards rest is as long as a few samples.
+    for item, rows, least in ((whole, slice(-10), 3e-5), (whole, slice(None), 0.02), (part, slice(None), 0.02)):
+        for j in range(2):
+            full, few = item.rows(j, signals), item.rows(j, signals[:, ::every], every)
+            assert_allclose(few[:, rows], full[:, rows], rtol=0, atol=least * np.max(np.abs(full)))
+            assert_array_equal(item.rows_of([(j, signals[1, ::every])], every)[0], few[1])
+
+
+def test_a_motion_at_fewer_samples_is_every_so_many_of_it_with_no_torque_that_is_faster(run: Recording):
+    time = np.arange(len(run.time)) / RATE
+    # Above half the lower rate: at every sixth sample it would be one of 3 Hz.
+    fast = np.sin(2.0 * np.pi * (RATE / 6.0 + 3.0) * time)
+    part = only(run, BELOW)
+    loud = only(replace(run, effort=run.effort + 0.5 * fast), BELOW)
+    assert part.decimated.rate == pytest.approx(RATE / 6.0)
+    assert_array_equal(part.decimated.q, part.motion.q[:, ::6])
+    assert_array_equal(part.decimated.a, part.motion.a[:, ::6])
+    assert_array_equal(part.decimated.fade, part.motion.fade[:, ::6])
+    inside = slice(5, -5)
+    assert_allclose(loud.decimated.torque[:, inside], part.decimated.torque[:, inside], rtol=0, atol=0.02)
+    assert np.max(np.abs(loud.torque[:, ::6] - part.torque[:, ::6])[:, inside]) > 0.4
+    for bands in ((20.0, 10.0), (2.5, None)):
+        wide = only(run, bands)
+        assert wide.decimation == 1 and wide.decimated is wide.motion
+    # Another torque comes with the same states.
+    other = part.with_torque_of(loud.stretch)
+    assert_allclose(other.decimated.torque, loud.decimated.torque, rtol=0, atol=1e-12)
+    assert other.decimated.kinematics is part.decimated.kinematics
 
 
 def test_without_a_band_every_used_sample_is_a_row_as_it_is(run: Recording):
