@@ -119,7 +119,7 @@ def low_pass_every(signal: Array, rate: float, cut: float | None, step: int, wei
 
 def _by_phase(signals: Array, step: int) -> Array:
     """Return signals, shape (..., N), as those of each phase, shape (..., step, N / step): every step-th sample from it on."""
-    return signals.reshape(*signals.shape[:-1], -1, step).swapaxes(-1, -2)
+    return signals.reshape(*signals.shape[:-1], signals.shape[-1] // step, step).swapaxes(-1, -2)
 
 
 @dataclass(frozen=True, eq=False)

@@ -129,6 +129,16 @@ def test_columns_and_slopes_of_what_is_smooth_are_those_of_all_samples(monkeypat
         assert all(np.array_equal(a[joint], b[joint]) for a, b in zip(again, rows, strict=True) for joint in b)
 
 
+def test_a_model_of_nothing_but_bodies_has_nothing_that_jumps():
+    whole = observed(exact_runs()[:1], (6.2, 6.2))
+    bodies = TorqueModel("bodies", ROBOT, (whole.model.rigid_body,))
+    seen = observe(bodies, whole.data)
+    scene = scene_on(bodies, wls(seen).value, seen)
+    assert whole.data.stretches[0].decimation == 2
+    (rows,) = CandidateColumns(seen).rows(scene, [Candidate(JointElasticity(), Member(1, (10.0, 0.2)))])
+    assert all(np.all(np.isfinite(own)) and np.any(own) for own in rows.values())
+
+
 def test_the_predicted_torque_is_that_of_the_model_with_them_as_terms(gapped: Observations):
     value = wls(gapped).value
     scene = scene_on(gapped.model, value, gapped)

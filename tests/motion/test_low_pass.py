@@ -98,6 +98,11 @@ def test_the_low_pass_at_kept_samples_is_the_low_pass(count: int, cut: float, st
     )
 
 
+@pytest.mark.parametrize("step", [1, 4])
+def test_of_no_signals_nothing_is_left(step: int):
+    assert low_pass_every(np.zeros((0, 1001)), 1000.0, 50.0, step).shape == (0, -(-1001 // step))
+
+
 def test_without_a_band_every_sample_is_itself():
     signal = np.arange(20.0)[None]
     assert_array_equal(low_pass_every(signal, 100.0, None, 3), signal[:, ::3])
