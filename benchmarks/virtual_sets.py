@@ -127,8 +127,9 @@ class VirtualSet:
 
 
 def arm_joints(robot: Robot) -> list[str]:
-    """Return the joints that are not those of a gripper."""
-    return [name for name in robot.joints if not any(word in name for word in GRIPPERS)]
+    """Return the joints that are not those of a gripper; all, of a robot that is a finger."""
+    found = [name for name in robot.joints if not any(word in name for word in GRIPPERS)]
+    return found or list(robot.joints)
 
 
 def random_arm(name: str, stated: bool, bits: int, folder: Path, rng: np.random.Generator) -> tuple[VirtualArm, Robot]:

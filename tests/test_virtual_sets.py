@@ -32,6 +32,11 @@ def small(sets: ModuleType, **asked: object) -> object:
     return sets.Asked(**{"rate": 250.0, "recordings": 2, "motions": 1, "duration": (5.0, 5.5), **asked})
 
 
+def test_a_gripper_is_left_out_but_of_a_robot_that_is_one(sets: ModuleType) -> None:
+    assert sets.arm_joints(load_robot("panda")) == [f"panda_joint{k}" for k in range(1, 8)]
+    assert len(sets.arm_joints(load_robot("finger_edu"))) == 3
+
+
 @pytest.mark.parametrize("kind", ["fourier", "points", "sweep"])
 @pytest.mark.parametrize("name", ["ur5", "panda", "scara03"])
 def test_motions_keep_all_limits_and_are_their_own_derivatives(sets: ModuleType, kind: str, name: str) -> None:
