@@ -60,7 +60,8 @@ class ReferenceMotion:
                 raise RecordingError(
                     f"{self.name}: {name} reaches {np.max(np.abs(values)):.3g}, which no arm does; give it in rad, m and s"
                 )
-        if len(self.time) < 2 or not np.abs(self.time[-1]) < HUGE or not np.all(np.diff(self.time) > 0):
+        # What is not finite has no differences.
+        if len(self.time) < 2 or not np.all(np.abs(self.time) < HUGE) or not np.all(np.diff(self.time) > 0):
             raise RecordingError(f"{self.name}: time must have at least two samples and grow strictly")
 
     @property
@@ -161,9 +162,11 @@ def read_trajectory(path: Path | str, robot: Robot) -> ReferenceMotion:
             )
     columns = read_columns(path, ["time", *(name for group in wanted.values() for name in group)])
     time = np.asarray(columns["time"])
+    # One that does not begin at a time is refused as it is.
+    start = time[0] if len(time) and np.isfinite(time[0]) else 0.0
     try:
         return ReferenceMotion(
-            path.stem, robot.joints, time - time[:1].sum(),
+            path.stem, robot.joints, time - start,
             *(np.array([columns[name] for name in group]) for group in wanted.values()),
         )  # fmt: skip
     except RecordingError as error:

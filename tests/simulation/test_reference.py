@@ -60,3 +60,19 @@ def test_a_motion_with_a_gap_in_its_values_is_refused() -> None:
     broken[1, 3] = np.nan
     with pytest.raises(RecordingError, match="velocity has a value that is not finite"):
         replace(motion, velocity=broken)
+
+
+@pytest.mark.parametrize("place", [0, 2, -1])
+@pytest.mark.parametrize("value", [np.inf, -np.inf, np.nan])
+@pytest.mark.filterwarnings("error")
+def test_a_time_that_is_none_is_refused_in_one_line(tmp_path: Path, place: int, value: float) -> None:
+    arm = scara()
+    motion = swing(arm.robot, 0.4)
+    time = motion.time.copy()
+    time[place] = value
+    columns = {"time": time}
+    for kind in ("position", "velocity", "acceleration"):
+        columns |= {f"{joint}.{kind}": row for joint, row in zip(motion.joints, getattr(motion, kind), strict=True)}
+    write_columns(tmp_path / "swing.csv", columns)
+    with pytest.raises(RecordingError, match=r"swing\.csv: .*time must have at least two samples and grow strictly"):
+        read_trajectory(tmp_path / "swing.csv", arm.robot)
