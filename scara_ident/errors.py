@@ -33,6 +33,10 @@ class MemoryLimit(RecordingError):
     """A recording that takes more memory than is allowed."""
 
 
+class ProcessEnded(ScaraIdentError):
+    """A process of a run that ended before it had answered."""
+
+
 class LostArm(ScaraIdentError):
     """A simulated arm that leaves all bounds."""
 

@@ -13,7 +13,7 @@ from functools import cache
 from multiprocessing.connection import Connection, wait
 from typing import Any, TypeVar
 
-from scara_ident.errors import ScaraIdentError
+from scara_ident.errors import ProcessEnded
 from scara_ident.threads import available_cores, one_blas_thread, one_thread, works_alone
 
 Item = TypeVar("Item")
@@ -224,8 +224,8 @@ def _taken(worker: Connection) -> tuple[bool, Any]:
     return done, found
 
 
-def _lost() -> ScaraIdentError:
-    return ScaraIdentError(
+def _lost() -> ProcessEnded:
+    return ProcessEnded(
         "a process of this run was ended from outside, as where memory runs out; give fewer recordings at a time, or shorter ones"
     )
 

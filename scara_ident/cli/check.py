@@ -29,6 +29,7 @@ def check(
 ) -> None:
     """Say whether an arm can run a motion, what limits it, and what energy it takes; exit status 1 if it cannot."""
     from scara_ident.cli.joint_values import limits_by_joint
+    from scara_ident.cli.reading import read_apart
     from scara_ident.errors import ScaraIdentError
     from scara_ident.export.result import read_identified
     from scara_ident.files import write_json
@@ -47,7 +48,7 @@ def check(
     )
     with progress() as work:
         work("reading the motion")
-        motion = read_motion(trajectory, known)
+        motion = read_apart(lambda: read_motion(trajectory, known), trajectory)
         work("looking at every limit", READING_SHARE)
         found = run(known, motion, limits)
     content = check_dict(found)

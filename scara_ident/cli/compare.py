@@ -16,18 +16,20 @@ def compare(
     verbose: options.Verbose = False,
 ) -> None:
     """Set every trajectory's parameters against every trajectory."""
-    from scara_ident.files import write_json
-    from scara_ident.identification.compare import compare as run
-    from scara_ident.recording.recording import read_usable
-    from scara_ident.report.comparison import comparison_dict
-    from scara_ident.report.told.comparison import tables
+    from scara_ident.cli.reading import read_beside
     from scara_ident.robot.robot import load_robot
 
     check_report(output, "comparison")
     arm = load_robot(robot)
     with progress() as work:
         work("reading the recordings")
-        given, useless = read_usable(recordings, arm)
+        with read_beside(arm, recordings) as wanted:
+            from scara_ident.files import write_json
+            from scara_ident.identification.compare import compare as run
+            from scara_ident.report.comparison import comparison_dict
+            from scara_ident.report.told.comparison import tables
+
+            ((given, useless),) = wanted()
         result = run(arm, given, model=model, method=method, progress=work.part(READING_SHARE, 1.0))
     content = comparison_dict(result)
     console = result_console(content, json)

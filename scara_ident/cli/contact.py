@@ -26,9 +26,9 @@ def contact(
     json: options.Json = False,
 ) -> None:
     """Find contact with the arm in recordings: when, on which joints, and the force at the tool or the link."""
+    from scara_ident.cli.reading import read_beside
     from scara_ident.export.result import read_identified
     from scara_ident.files import write_json
-    from scara_ident.recording.recording import read_usable
     from scara_ident.recording.shared_samples import shared_samples
     from scara_ident.use.contact import contacts_dict, look_for_contact
     from scara_ident.use.observer import contact_observer
@@ -38,8 +38,8 @@ def contact(
         work("reading the model and recordings")
         known = read_identified(result, robot, determined=True)
         arm = known.robot
-        quiet, notes = read_usable(free, arm)
-        watched, more = read_usable(recordings, arm)
+        with read_beside(arm, free, recordings) as wanted:
+            (quiet, notes), (watched, more) = wanted()
         more += [
             f"{other.path}: {share:.0%} of its samples are those of {first.path}, given as free of contact; a contact in it is in the "
             "thresholds too, and may not be found"

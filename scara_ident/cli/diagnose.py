@@ -55,7 +55,7 @@ def diagnose(
     verbose: options.Verbose = False,
 ) -> None:
     """Find what the model lacks, trace it to a physical effect, add it, report before and after."""
-    from scara_ident.cli.startup import read_beside
+    from scara_ident.cli.reading import read_beside
     from scara_ident.robot.robot import load_robot
 
     check_report(output, "diagnosis")

@@ -83,6 +83,7 @@ def excite(
     import numpy as np
 
     from scara_ident.cli.joint_values import joint_numbers, numbers
+    from scara_ident.cli.reading import read_beside
     from scara_ident.diagnosis.answerability import inquiry_of
     from scara_ident.errors import UsageError
     from scara_ident.estimation.estimate import PAPER_SAMPLES
@@ -107,7 +108,6 @@ def excite(
     from scara_ident.files import write_json
     from scara_ident.identification.identify import known_information
     from scara_ident.model.model import build_model
-    from scara_ident.recording.recording import read_usable
     from scara_ident.report.html.excitation import excitation_report
     from scara_ident.report.pictures import design_picture
     from scara_ident.report.told.design import limit_table
@@ -149,7 +149,8 @@ def excite(
         std = noise_of(arm, joint_numbers(noise, "--noise"), parameters) * np.sqrt(0.5 * counted / NOISE_BAND)
     with progress() as work:
         work("reading what is known")
-        recorded, useless = read_usable(known or (), arm)
+        with read_beside(arm, known or ()) as read:
+            ((recorded, useless),) = read()
         weights = None if std is None else 1.0 / std
         prior = known_information(equation, recorded, counted, weights) if recorded else None
         inquiry = None if asked is None else inquiry_of(asked, arm, recorded)

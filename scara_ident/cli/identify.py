@@ -30,7 +30,7 @@ def identify(
     verbose: options.Verbose = False,
 ) -> None:
     """Estimate the parameters from recordings and predict torques that were not fitted."""
-    from scara_ident.cli.startup import read_beside
+    from scara_ident.cli.reading import read_beside
     from scara_ident.errors import UsageError
     from scara_ident.robot.robot import load_robot
 

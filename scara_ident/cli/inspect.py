@@ -43,6 +43,7 @@ def inspect(
     json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Show what is in a file, guess which columns are the arm's, audit it and write a first robot.yaml."""
+    from scara_ident.cli.reading import read_apart
     from scara_ident.errors import ScaraIdentError, UsageError
     from scara_ident.files import check_output, write_text
     from scara_ident.inspection.inspection import inspect_file
@@ -55,7 +56,9 @@ def inspect(
     check_output(output)
     with progress() as work:
         work("reading the file")
-        found = inspect_file(file, urdf=urdf, robot=robot, joints=joints, folder=output or ".")
+        found = read_apart(
+            lambda: inspect_file(file, urdf=urdf, robot=robot, joints=joints, folder=output or "."), file
+        )
     if target is not None and found.description is not None:
         write_text(target, found.description)
     if json:

@@ -32,9 +32,9 @@ def use(
     json: options.Json = False,
 ) -> None:
     """Say what the model wins: fed forward on virtual arms, and in simulation beside recordings."""
+    from scara_ident.cli.reading import read_beside
     from scara_ident.export.result import read_identified
     from scara_ident.files import write_json
-    from scara_ident.recording.recording import read_usable
     from scara_ident.report.html.use import use_report
     from scara_ident.report.use import WORDS, use_dict
     from scara_ident.simulation.named import named_motion
@@ -45,7 +45,8 @@ def use(
     arm = model.robot
     motion = None if trajectory is None else named_motion(trajectory, arm)
     with progress() as work:
-        given, useless = read_usable(recording or (), arm)
+        with read_beside(arm, recording or ()) as wanted:
+            ((given, useless),) = wanted()
         found = run(model, motion, given, seed=seed, progress=work)
     content = use_dict(found)
     console = result_console(content, json)
