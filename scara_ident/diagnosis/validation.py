@@ -16,7 +16,7 @@ from scara_ident.diagnosis.held_out_states import HeldOut, held_out_states
 from scara_ident.diagnosis.outcome import Outcome
 from scara_ident.diagnosis.search import Search
 from scara_ident.diagnosis.selection_step import observed_at_every_sample
-from scara_ident.estimation.another_run import of_another_run
+from scara_ident.estimation.another_run import left_beside_own, of_another_run
 from scara_ident.estimation.days import widening
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.identification.events import Event
@@ -41,7 +41,7 @@ class Validation:
     unsure : ndarray, shape (n,)
         Rms error that a right model has there, N m (N), see `unsure_of_others`.
     apart : ndarray, shape (n,)
-        Rms torque by which runs were found to differ, N m (N).
+        Rms torque by which runs were found to differ, N m (N); zero where these leave too much beside any such difference.
     """
 
     before: Observations
@@ -68,19 +68,52 @@ def validated(outcome: Outcome, data: PreparedData) -> Validation:
     before = observe(found.base, held.data)
     after = _with_effects(found, held, before)
     unsure = unsure_of_others(model, after)
-    apart = np.zeros(robot.n)
-    if model.variation:
-        # Of few runs how far they lie apart is known badly.
-        apart = widening(len(outcome.training.each) - 1) * of_another_run(model.variation, after, value)
-    known = [robot.by_joint(each) for each in (unsure, apart)]
-    events = [own_uncertainty(event, *known) for event in held_out_events(value, outcome.training, after)]
+    differ = _Differences(outcome, after, unsure)
+    events = [
+        own_uncertainty(event, robot.by_joint(unsure), robot.by_joint(differ.of(event.recording)))
+        for event in held_out_events(value, outcome.training, after)
+    ]
     if outcome.unexplained is not None:
         # That something stays unexplained is why a whole recording is, and no event.
         events = [event for event in events if event.kind != "unknown" or np.isfinite(event.score)]
     quiet = quiet_blocks(held.data, events)
     undisturbed = after if np.all(quiet) else after.faded(quiet)
     gains = held_out_gains(found, model, undisturbed, before, quiet, held.correction)
-    return Validation(before, after, tuple(events), undisturbed, gains, unsure, apart, held.notes)
+    return Validation(before, after, tuple(events), undisturbed, gains, unsure, differ.of(shares=quiet), held.notes)
+
+
+@dataclass(frozen=True, eq=False)
+class _Differences:
+    """By how much runs were found to differ, where that is what recordings held out differ by.
+
+    Of runs that are all of different motions nobody can tell whether they differ, or the model lacks something that differs from
+    motion to motion: a further run then leaves much in other directions too.
+    """
+
+    outcome: Outcome
+    after: Observations
+    unsure: Array
+
+    def of(self, recording: str | None = None, shares: Array | None = None) -> Array:
+        """Return the rms torque by which one of the recordings, or all, may differ for that, N m (N), shape (n,)."""
+        variation, value = self.outcome.after.variation, self.outcome.after.value
+        if not variation or not self.after.data.recordings:
+            return np.zeros(len(self.unsure))
+        # Of few runs how far they lie apart is known badly.
+        wide = widening(len(self.outcome.training.each) - 1)
+        apart = wide * of_another_run(variation, self.after, value)
+        names = [item.name for item in self.after.data.recordings]
+        own = np.array([recording in (None, name) for name in names])[self.after.owner]
+        counted = own * (1.0 if shares is None else shares)
+        usual = self.outcome.search.step.criteria.worse_held_out
+        for joint, (left, rows) in enumerate(
+            zip(left_beside_own(variation, self.after, value, counted), self.after.joints, strict=True)
+        ):
+            samples = float(rows.counts @ counted)
+            most = np.hypot(usual * self.outcome.training.joints[joint].rms(value), self.unsure[joint])
+            if left @ left > samples * most**2:
+                apart[joint] = 0.0
+        return apart
 
 
 def _with_effects(found: Search, held: HeldOut, before: Observations) -> Observations:

@@ -60,6 +60,39 @@ def variance_of_another_run(
     return total
 
 
+def left_beside_own(
+    variation: RunVariation, observations: Observations, value: Array, shares: Array | None = None
+) -> tuple[Array, ...]:
+    """Return what a model leaves of further runs beside what each of them may differ by, (N,) on the rows of each joint.
+
+    Each run has as much of every kind that runs were found to differ by as leaves least on a joint. What is left stands for as many
+    rows as there are, and not for those that these amounts take up.
+
+    Parameters
+    ----------
+    variation, observations, value
+        As of `of_another_run`.
+    shares : ndarray, shape (blocks,), optional
+        How much each block counts; all by default.
+    """
+    lengths = [np.diff(rows.starts) for rows in observations.joints]
+    sizes = [np.ones(int(each.sum())) if shares is None else np.repeat(np.sqrt(shares), each) for each in lengths]
+    left = [size * rows.left(value) for size, rows in zip(sizes, observations.joints, strict=True)]
+    for joint, std, directions in _told(variation, observations, value):
+        run = np.repeat(observations.owner, lengths[joint])
+        differing = (sizes[joint] * directions[std > 0.0]).T
+        for one in np.unique(run[sizes[joint] > 0.0]):
+            place = (run == one) & (sizes[joint] > 0.0)
+            columns, torque = differing[place], left[joint][place]
+            scale = np.linalg.norm(columns, axis=0)
+            columns = columns / np.where(scale > 0.0, scale, 1.0)
+            amount, _, rank, _ = np.linalg.lstsq(columns, torque)
+            free = len(torque) - rank
+            if free > 0:
+                left[joint][place] = np.sqrt(len(torque) / free) * (torque - columns @ amount)
+    return tuple(left)
+
+
 def _told(variation: RunVariation, observations: Observations, value: Array) -> Iterator[tuple[int, Array, Array]]:
     """Give joints on which runs differ, by which standard deviation, and what one unit of each does on their rows."""
     if not observations.raw:

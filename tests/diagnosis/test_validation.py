@@ -4,17 +4,23 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import lru_cache
+from importlib import import_module
 
 import numpy as np
+import pytest
 
 from scara_ident.diagnosis import Diagnosis, diagnose
+from scara_ident.diagnosis.outcome import Outcome
+from scara_ident.diagnosis.validation import Validation, validated
 from scara_ident.effects.friction import PositionDependentFriction
 from scara_ident.estimation.run_offsets import rms_of
+from scara_ident.motion.prepared import PreparedData
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import load_robot
 from scara_ident.simulation import simulate, virtual_arm
 from tests.diagnosis.made import BANDS, NOISE, multisine
 from tests.diagnosis.test_held_out_gain import UNEVEN, runs
+from tests.estimation.test_run_variation import runs as differing_runs
 
 
 def pushed(run: Recording, size: float) -> Recording:
@@ -92,3 +98,33 @@ def test_of_one_recording_runs_are_not_known_to_differ():
     )
     assert all("times that of the training" in item.why for item in result.evidence)
     assert result.verdict == "undecided"
+
+
+def test_what_runs_differ_by_excuses_no_error_that_is_none_of_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """`complete` stood beside 2.9 times the training's error, "as runs were found to differ": in delays, of which it was none."""
+    seen: list[Validation] = []
+
+    def kept(outcome: Outcome, data: PreparedData) -> Validation:
+        seen.append(validated(outcome, data))
+        return seen[-1]
+
+    monkeypatch.setattr(import_module("scara_ident.diagnosis.diagnose"), "validated", kept)
+    different = (0.06, 0.02, 0.0, 0.0)
+    training = differing_runs(np.random.default_rng(3), different, count=8, seconds=8.0)
+    plain = differing_runs(np.random.default_rng(6), different, count=3, seconds=8.0)
+    # A torque over the angle, which is no kind of difference.
+    lacking = [replace(run, effort=run.effort + 0.1 * np.sin(6.0 * run.position)) for run in plain]
+    for held_out in (plain, lacking):
+        diagnose(
+            load_robot(),
+            training,
+            model="basic",
+            validation=held_out,
+            bands=BANDS,
+            catalogue=(PositionDependentFriction(),),
+        )
+    before, after = seen
+    assert np.all(before.apart > 0.0)
+    assert not np.any(after.apart)
+    assert not any(event.kind == "unknown" for event in before.events)
+    assert {event.kind for event in after.events} == {"unknown"}
