@@ -12,7 +12,7 @@ from multiprocessing import resource_tracker
 from queue import Empty, Queue
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from scara_ident.errors import ScaraIdentError, UsageError
+from scara_ident.errors import ProcessEnded, ScaraIdentError, UsageError
 from scara_ident.fleet.folder import INSTALL
 from scara_ident.processes import uninterrupted
 
@@ -23,7 +23,7 @@ Result = TypeVar("Result")
 # A cluster that has had no worker for so long gets none any more, s; how often that is looked at.
 NO_WORKER_SECONDS = 60.0
 LOOK_SECONDS = 2.0
-# A piece of work that so many workers died on is given up.
+# A piece of work that so many workers and one more died on is given up.
 MOST_DEATHS = 3
 CONNECT_SECONDS = "10s"
 # Variables that Dask gives processes beside those of its configuration.
@@ -245,7 +245,14 @@ def run_all(
 
 
 def _outcome(future: Future[Any]) -> Any:
+    from distributed import KilledWorker
+
     try:
         return future.result()
+    except KilledWorker:
+        return ProcessEnded(
+            f"{MOST_DEATHS + 1} workers died on it, as on a file that is damaged or where memory runs out; `scara-ident identify` "
+            "on its recordings names such a file"
+        )
     except Exception as error:
         return error

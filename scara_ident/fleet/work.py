@@ -236,4 +236,6 @@ def _key_or_error(file: RecordingFile) -> str | OSError:
 
 
 def _reason(error: Exception) -> str:
-    return " ".join(f"{type(error).__name__}: {error}".split())[:200]
+    # What is ours says what to do.
+    said = str(error) if isinstance(error, ScaraIdentError) else f"{type(error).__name__}: {error}"[:200]
+    return " ".join(said.split())

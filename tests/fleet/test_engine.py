@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from scara_ident.errors import ScaraIdentError, UsageError
+from scara_ident.errors import ProcessEnded, ScaraIdentError, UsageError
 from scara_ident.fleet import engine as module
 from scara_ident.fleet.engine import Engine, Job, run_all, started
 
@@ -26,6 +26,10 @@ def die_once(flag: str) -> str:
         Path(flag).touch()
         os.kill(os.getpid(), signal.SIGKILL)
     return "lived"
+
+
+def die() -> None:
+    os.kill(os.getpid(), signal.SIGABRT)
 
 
 def interrupted(x: int) -> int:
@@ -55,6 +59,11 @@ def test_what_raises_hands_on_its_exception_and_what_follows_is_done(cluster, tm
         engine.run([Job(double, (3,), then), Job(double, (-1,), then), Job(die_once, (flag,), then)])
         engine.run([])
     assert sorted(str(item) for item in found) == ["12", "6", "lived", "negative"]
+
+
+def test_work_on_which_all_workers_die_says_what_to_look_at():
+    with pytest.raises(ProcessEnded, match=r"4 workers died on it, as on a file that is damaged .* names such a file"):
+        run_all(die, [()], workers=1)
 
 
 def test_many_calls_give_their_results_in_order_and_raise_when_all_is_done(cluster):
