@@ -84,8 +84,14 @@ def not_there(item: Item) -> list[Item]:
         if (found["effect"], found["joint"]) not in true
         and not names & set(found["group"])
         and not any(_contact(found, each) for each in item["true"])
+        and not _carried(found, item.get("true_events", []))
         and not variation.get(BEHIND.get(found["effect"], ""), 0.0)
     ]
+
+
+def _carried(found: Item, events: Sequence[Item]) -> bool:
+    """Return whether a payload is named where one is carried for a while."""
+    return found["effect"] == "payload_change" and any(event["kind"] == "payload" for event in events)
 
 
 def _contact(found: Item, true: Item) -> bool:
