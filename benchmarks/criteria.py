@@ -22,7 +22,7 @@ from typing import Any, ClassVar
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from attribution_tables import hits, right, wrong
+from attribution_right import hits, right, wrong
 from virtual_sets import simulate_set, tasks, write_set
 
 from scara_ident.diagnosis import diagnose

@@ -62,13 +62,3 @@ def test_the_interval_of_a_share_counts_sets_and_not_parameters(tables: ModuleTy
     low, high = tables._interval([[0.0] * 30, [3.0] * 10] * 4)
     assert low < 0.6 and high > 0.85
     assert tables._interval([[0.0], [-1.0]]) == (1.0, 1.0)
-
-
-def test_a_payload_that_is_carried_for_a_while_is_there(tables: ModuleType) -> None:
-    found = {"effect": "payload_change", "joint": None, "group": [], "parameters": {"mass": [2.0, 0.1]}}
-    other = {**found, "effect": "spring", "joint": "joint1", "parameters": {"stiffness": [1.0, 0.1]}}
-    events = [{"recording": "M1_1", "kind": "push"}, {"recording": "M2_1", "kind": "payload"}]
-    one = {**item([0]), "true": [], "found": [found, other]}
-    assert tables.wrong({**one, "true_events": events}) == ["spring"]
-    assert tables.wrong({**one, "true_events": events[:1]}) == ["payload_change", "spring"]
-    assert tables.wrong(one) == ["payload_change", "spring"]
