@@ -27,8 +27,8 @@ from scara_ident.excitation.search import Effort, Progress
 from scara_ident.files import write_json, written_together
 from scara_ident.model.model import build_model
 from scara_ident.progress import Work
+from scara_ident.recording.apart import read_usable
 from scara_ident.recording.files.parquet_csv import SUFFIXES
-from scara_ident.recording.recording import read_usable
 from scara_ident.report.html.diagnosis import DiagnosisContext, diagnosis_report
 from scara_ident.robot.robot import Robot
 

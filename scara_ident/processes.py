@@ -7,10 +7,11 @@ import pickle
 import signal
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, suppress
 from contextvars import ContextVar
-from functools import cache
+from functools import cache, partial
 from multiprocessing.connection import Connection, wait
+from threading import Thread
 from typing import Any, TypeVar
 
 from scara_ident.errors import ProcessEnded
@@ -96,8 +97,63 @@ def beside(work: Callable[[], Result]) -> Iterator[Callable[[], Result]]:
 
 
 @contextmanager
+def each_beside(
+    work: Callable[[Item], Result], items: Sequence[Item]
+) -> Iterator[Callable[[], list[Callable[[], Result]]]]:
+    """Do work on items in another process meanwhile, one after the other; yields what waits for them all.
+
+    That returns what gives each result, or raises its error. An item that ends its process gets another one, and where it ends that too
+    its error is `ProcessEnded`; the others have theirs. Where the system cannot fork, or no command runs (see `own_process`), an item is
+    worked on when it is asked for.
+
+    Parameters
+    ----------
+    work : callable
+        Its results are sent to the caller, as are its errors, each as soon as it is there.
+    """
+    if not items or not _OWN.get() or not _may_fork():
+        yield lambda: [cache(partial(work, item)) for item in items]
+        return
+
+    def start() -> AbstractContextManager[list[Connection]]:
+        return _forked(1, lambda place: work(items[place]))
+
+    def taken(worker: Connection) -> Callable[[], Result]:
+        # Of one at a time it is known which of them ended the process.
+        worker.send(len(found))
+        return partial(_result, *_taken(worker))
+
+    found = list[Callable[[], Result]]()
+
+    def ahead(worker: Connection) -> None:
+        # The process may end, or be ended where nobody waits for it any more; what is too large for the memory ends here.
+        with suppress(ProcessEnded, OSError, MemoryError):
+            while len(found) < len(items):
+                found.append(taken(worker))
+
+    def ended() -> Result:
+        raise _lost()
+
+    def rest() -> list[Callable[[], Result]]:
+        receiver.join()
+        while len(found) < len(items):
+            with start() as (another,):
+                place = len(found)
+                ahead(another)
+                if len(found) == place:
+                    found.append(ended)
+        return found
+
+    with start() as (worker,):
+        receiver = Thread(target=ahead, args=(worker,), daemon=True)
+        with uninterrupted():
+            receiver.start()
+        yield rest
+
+
+@contextmanager
 def own_process() -> Iterator[None]:
-    """Let `halved` use another process: nobody else's threads run in this one, whose locks a fork would never see released.
+    """Let `halved` and `each_beside` use another process: nobody else's threads run in this one, whose locks a fork would never see released.
 
     A command says so of its own; in a program or a notebook of others nothing is forked unasked.
     """

@@ -10,13 +10,15 @@ import signal
 import threading
 import time
 import weakref
+from pathlib import Path
 from threading import Thread
+from typing import Any
 
 import pytest
 
 from scara_ident import processes
-from scara_ident.errors import ScaraIdentError
-from scara_ident.processes import available_cores, beside, halved, map_in_order, own_process
+from scara_ident.errors import ProcessEnded, ScaraIdentError
+from scara_ident.processes import available_cores, beside, each_beside, halved, map_in_order, own_process
 from scara_ident.threads import one_thread, side_by_side
 from tests.shared import PATIENCE
 
@@ -213,3 +215,68 @@ def test_whose_result_nobody_waits_for_is_not_waited_for():
     next(results)
     results.close()
     assert time.monotonic() - start < 30.0
+
+
+@pytest.fixture
+def a_command():
+    with own_process():
+        yield
+
+
+@pytest.mark.usefixtures("a_command")
+def test_each_is_done_beside_and_one_that_ends_its_process_takes_no_other_with_it(tmp_path: Path):
+    def work(item: int) -> tuple[int, int]:
+        turn = tmp_path / f"{item}"
+        again = turn.exists()
+        turn.touch()
+        if item in (0, 3) or (item == 2 and not again):
+            os.kill(os.getpid(), signal.SIGKILL)
+        return 6 // (item - 1), os.getpid()
+
+    with each_beside(work, range(6)) as wanted:
+        found = wanted()
+    assert [found[k]()[0] for k in (2, 4, 5)] == [6, 2, 1]
+    assert os.getpid() not in {found[k]()[1] for k in (2, 4, 5)}
+    for place, error in ((0, ProcessEnded), (1, ZeroDivisionError), (3, ProcessEnded)):
+        for _ in range(2):
+            with pytest.raises(error):
+                found[place]()
+
+
+@pytest.mark.usefixtures("a_command")
+def test_each_is_sent_as_soon_as_it_is_there_and_only_what_is_done_is_waited_for():
+    # More than a pipe holds: with nobody who takes it, a process would not get to the second.
+    before, start = set(multiprocessing.active_children()), time.monotonic()
+    with each_beside(lambda item: b"0" * 10_000_000, range(3)) as wanted:
+        assert [len(found()) for found in wanted()] == [10_000_000] * 3
+    with each_beside(lambda item: time.sleep(60.0), range(2)):
+        pass
+    assert time.monotonic() - start < 30.0
+    assert set(multiprocessing.active_children()) <= before
+
+
+@pytest.mark.usefixtures("a_command")
+def test_one_whose_result_is_too_large_to_be_taken_is_as_one_that_ends_its_process(monkeypatch: pytest.MonkeyPatch):
+    loads = pickle.loads
+
+    def small(sent: bytes) -> Any:
+        if len(sent) > 1000:
+            raise MemoryError
+        return loads(sent)
+
+    monkeypatch.setattr(processes.pickle, "loads", small)
+    with each_beside(lambda item: b"0" * 10**item, range(1, 5, 3)) as wanted:
+        one, other = wanted()
+    assert one() == b"0" * 10
+    with pytest.raises(ProcessEnded):
+        other()
+
+
+def test_in_another_s_program_each_is_done_there_when_it_is_asked_for_and_once():
+    done = list[int]()
+    with each_beside(lambda item: (done.append(item), os.getpid())[1], range(2)) as wanted:
+        first, second = wanted()
+        assert done == []
+        assert second() == second() == os.getpid()
+    assert done == [1]
+    assert first() == os.getpid()

@@ -29,10 +29,10 @@ def check(
 ) -> None:
     """Say whether an arm can run a motion, what limits it, and what energy it takes; exit status 1 if it cannot."""
     from scara_ident.cli.joint_values import limits_by_joint
-    from scara_ident.cli.reading import read_apart
     from scara_ident.errors import ScaraIdentError
     from scara_ident.export.result import read_identified
     from scara_ident.files import write_json
+    from scara_ident.recording.apart import read_apart
     from scara_ident.use.check import CLOSE, check_dict, read_motion
     from scara_ident.use.check import check as run
     from scara_ident.use.joint_limits import joint_limits
@@ -48,7 +48,7 @@ def check(
     )
     with progress() as work:
         work("reading the motion")
-        motion = read_apart(lambda: read_motion(trajectory, known), trajectory)
+        motion = read_apart(lambda path: read_motion(path, known), trajectory)
         work("looking at every limit", READING_SHARE)
         found = run(known, motion, limits)
     content = check_dict(found)

@@ -43,10 +43,10 @@ def inspect(
     json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Show what is in a file, guess which columns are the arm's, audit it and write a first robot.yaml."""
-    from scara_ident.cli.reading import read_apart
     from scara_ident.errors import ScaraIdentError, UsageError
     from scara_ident.files import check_output, write_text
     from scara_ident.inspection.inspection import inspect_file
+    from scara_ident.recording.apart import read_apart
 
     target = None if output is None else output / "robot.yaml"
     if target is not None and urdf is None:
@@ -57,7 +57,7 @@ def inspect(
     with progress() as work:
         work("reading the file")
         found = read_apart(
-            lambda: inspect_file(file, urdf=urdf, robot=robot, joints=joints, folder=output or "."), file
+            lambda path: inspect_file(path, urdf=urdf, robot=robot, joints=joints, folder=output or "."), file
         )
     if target is not None and found.description is not None:
         write_text(target, found.description)

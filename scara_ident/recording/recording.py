@@ -359,26 +359,6 @@ def read_recordings(words: Sequence[Path | str], robot: Robot, *, need_effort: b
     return tuple(read_recording(path, robot, need_effort=need_effort) for path in recording_paths(words))
 
 
-def read_usable(words: Sequence[Path | str], robot: Robot) -> tuple[tuple[Recording, ...], list[str]]:
-    """Read recordings with effort, without those that cannot be used, and say which; at least one of those that are named.
-
-    Raises
-    ------
-    UsageError, RecordingError
-        As `read_recordings`; that of the first recording if none can be used.
-    """
-    found, notes, errors = [], [], []
-    for path in recording_paths(words):
-        try:
-            found.append(read_recording(path, robot))
-        except RecordingError as error:
-            errors.append(error)
-            notes.append(f"{error}; left out")
-    if errors and not found:
-        raise errors[0]
-    return tuple(found), notes
-
-
 def write_recording(recording: Recording, path: Path | str, *, effort_gain: Array | None = None) -> None:
     """Write a recording to a file, whole or not at all.
 
