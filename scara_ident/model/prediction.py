@@ -65,20 +65,18 @@ class Prediction(Frozen):
 
     @cached_property
     def _kept(self) -> Array:
-        """The parameters, zero for terms that are left out."""
-        kept = np.array(self.value)
-        for term in self.model.terms:
-            if not self._of_state(term):
-                kept[self.model.place(term)] = 0.0
-        return kept
+        """The parameters of `_in_state`."""
+        own = [self.value[self.model.place(term)] for term in self.model.terms if self._of_state(term)]
+        return np.concatenate([np.empty(0), *own])
 
     def _of_state(self, term: Term) -> bool:
         return self._functions[self.model.terms.index(term)] is not None
 
     @cached_property
     def _in_state(self) -> TorqueModel:
-        terms = tuple(term.in_state if isinstance(term, InState) else term for term in self.model.terms)
-        return replace(self.model, terms=terms)
+        """The model without the terms that are left out."""
+        terms = [term for term in self.model.terms if self._of_state(term)]
+        return replace(self.model, terms=tuple(term.in_state if isinstance(term, InState) else term for term in terms))
 
     @cached_property
     def _functions(self) -> tuple[StateTorque | None, ...]:
@@ -100,13 +98,15 @@ class Prediction(Frozen):
         for start in range(0, q.shape[1], CHUNK):
             own = slice(start, start + CHUNK)
             rows = self._in_state.joint_columns(states(q[:, own], v[:, own], a[:, own]))
-            torque[:, own] = [self._kept[columns] @ row for columns, row in zip(self.model.active, rows, strict=True)]
+            torque[:, own] = [
+                self._kept[columns] @ row for columns, row in zip(self._in_state.active, rows, strict=True)
+            ]
         return torque
 
 
 def states(q: Array, v: Array, a: Array) -> Motion:
-    """Return states (n, N) that follow no time as a motion: a second apart, of no recording."""
-    return Motion("", "", np.arange(float(q.shape[1])), q, v, a, None, 1.0)
+    """Return states (n, N) that follow no time as a motion of no recording: nothing is too fast for its rate."""
+    return Motion("", "", np.arange(float(q.shape[1])), q, v, a, None, np.inf)
 
 
 def _function(term: Term, value: Array) -> StateTorque | None:

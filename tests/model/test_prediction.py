@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scara_ident.effects import EffectTerm, Member
 from scara_ident.effects.gear import TransmissionLoss
 from scara_ident.effects.payload import PayloadChange
+from scara_ident.effects.periodic import TorqueRipple
 from scara_ident.effects.position import Spring
 from scara_ident.effects.presliding import Presliding
 from scara_ident.effects.signals import LinkTorque
@@ -93,6 +94,23 @@ def test_an_effect_of_the_state_is_in_it_and_one_with_a_memory_is_named():
     torque[:, 1] += value[16] * robot.drive_sign[1] * q[:, 1]
     np.testing.assert_allclose(found(q, v, a), torque, rtol=1e-12, atol=1e-10)
     np.testing.assert_allclose(found(q[3], v[3], a[3]), torque[3], rtol=1e-12, atol=1e-10)
+
+
+@pytest.mark.parametrize("speed", [0.01, 1.0, 10.0])
+def test_a_torque_per_motor_turn_is_in_it_at_any_speed(speed: float):
+    robot = load_robot()
+    scene = scene_of(robot)
+    model = TorqueModel("more", robot, (*scene.model.terms, EffectTerm(TorqueRipple(), Member(0, (2.0,)), scene)))
+    value = np.concatenate([scene.value, [0.03, 0.04]])
+    found = Prediction(model, value)
+    assert found.left_out == ()
+    q = np.array([np.linspace(0.3, 0.3 + 2.0 * np.pi / robot.reduction[0], 40, endpoint=False), np.zeros(40)]).T
+    v = np.array([np.full(40, speed), np.zeros(40)]).T
+    turn = 2.0 * robot.reduction[0] * q[:, 0]
+    ripple = found(q, v, 0.0 * q)[:, 0] - Prediction(scene.model, scene.value)(q, v, 0.0 * q)[:, 0]
+    np.testing.assert_allclose(ripple, 0.03 * np.sin(turn) + 0.04 * np.cos(turn), atol=1e-12)
+    alone = found(q[7], v[7], 0.0 * q[7])
+    np.testing.assert_allclose(alone, found(q, v, 0.0 * q)[7], atol=1e-12)
 
 
 def test_a_loss_beside_a_body_carried_in_some_recordings_is_predicted_without_it():
