@@ -48,8 +48,8 @@ class Channels:
     position, velocity, acceleration, effort, temperature, link_position : tuple of Channel
         One for each joint, in the robot's order. Efforts are converted to N m (N), or to A where a gain makes torque
         of them.
-    declared : frozenset of str
-        Signals that the robot description names; the others have the contract's columns, if any.
+    declared : tuple of str
+        Signals that the robot description names, and its time, in one order; the others have the contract's columns, if any.
     topic : str or None
         Topic of the bag that holds them.
     rate : float or None
@@ -63,7 +63,7 @@ class Channels:
     effort: tuple[Channel, ...]
     temperature: tuple[Channel, ...]
     link_position: tuple[Channel, ...]
-    declared: frozenset[str] = frozenset()
+    declared: tuple[str, ...] = ()
     topic: str | None = None
     rate: float | None = None
 
@@ -123,7 +123,7 @@ def build_channels(
             reader.channel(columns[k], joint, bool(prismatic[k]), float(reduction[k]), bool(has_gain[k]))
             for k, joint in enumerate(joints)
         )
-    declared = frozenset(name for name in ("time", *SIGNALS) if getattr(description, name) is not None)
+    declared = tuple(name for name in ("time", *SIGNALS) if getattr(description, name) is not None)
     clock = Channel(time.column, unit.factor)
     channels = _channels(clock, built, declared, description.topic, time.rate)
     _refuse_shared(channels, source, joints)
@@ -157,7 +157,7 @@ def recording_entry(channels: Channels, joints: Sequence[str]) -> dict[str, Any]
 def _channels(
     time: Channel,
     signals: Mapping[str, tuple[Channel, ...]],
-    declared: frozenset[str] = frozenset(),
+    declared: tuple[str, ...] = (),
     topic: str | None = None,
     rate: float | None = None,
 ) -> Channels:

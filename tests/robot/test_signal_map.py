@@ -84,7 +84,7 @@ def test_columns_are_named_by_a_pattern_or_one_by_one(tmp_path, place, columns):
     channels = described(tmp_path, f"{{position: {{{place}}}}}").channels
     assert channels is not None
     assert [channel.column for channel in channels.position] == columns
-    assert channels.declared == {"position"}
+    assert channels.declared == ("position",)
 
 
 @pytest.mark.parametrize(
