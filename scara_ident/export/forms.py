@@ -21,6 +21,7 @@ from scara_ident.export.traced_model import NOT_OF_STATE
 from scara_ident.model.terms import Friction, Offset, RigidBody, Term
 
 NO_PLACE = "the format has no place for it"
+AT_TIMES = "it was there at times; the arm is written as it is without it"
 NOT_READ = "programs that read it leave rotors out"
 # Torques of rigid bodies that differ by less, relative, are the same but for rounding.
 SAME = 1e-9
@@ -99,7 +100,8 @@ def said_by(form: Form, found: IdentifiedModel, standard: Array | None = None) -
     """Return the parameters with which a format says a model.
 
     Where it lacks anything, friction and offset, as far as it has them, are fitted again to the training observations,
-    all else being held.
+    all else being held. What was there in a part of the recordings, such as a payload, is held too, for it is not there in
+    the arm that is written: friction does not stand in for it.
 
     Parameters
     ----------
@@ -113,8 +115,10 @@ def said_by(form: Form, found: IdentifiedModel, standard: Array | None = None) -
     if standard is not None:
         place = model.place(model.rigid_body)
         value[place] = _base(form, model.rigid_body, standard)
-    for term, columns, _ in missing:
-        value[model.place(term).start + np.array(columns)] = 0.0
+    absent = {term: model.place(term).start + np.array(columns) for term, columns, _ in missing}
+    held = [term for term, _, why in missing if why == AT_TIMES]
+    for term in set(absent) - set(held):
+        value[absent[term]] = 0.0
     fitted, lower = _adjustable(form, found)
     changed = np.abs(value - found.value) > SAME * np.max(np.abs(found.value), initial=0.0)
     negative = value[fitted] < lower
@@ -122,6 +126,8 @@ def said_by(form: Form, found: IdentifiedModel, standard: Array | None = None) -
     if len(fitted) and (np.any(changed) or np.any(negative)):
         value[fitted] = _fitted(found.information, value, fitted, lower)
         refitted = tuple(model.names[k] for k in fitted)
+    for term in held:
+        value[absent[term]] = 0.0
     if standard is not None and not form.armature and np.any(standard[10 * found.robot.n :]):
         missing_names = (("armature", NOT_READ), *_told(found, missing))
     else:
@@ -171,9 +177,14 @@ def _unsaid(form: Form, found: IdentifiedModel) -> Iterator[tuple[Term, list[int
             if not form.offset:
                 yield term, columns, NO_PLACE
         elif isinstance(term, EffectTerm) and not term.effect.of_state:
-            yield term, columns, NOT_OF_STATE
+            yield term, columns, AT_TIMES if _at_times(term) else NOT_OF_STATE
         elif not form.effects:
             yield term, columns, NO_PLACE
+
+
+def _at_times(term: EffectTerm) -> bool:
+    """Whether an arm has it at times, and is the arm of the other parameters else: a body that links carry, or what some recordings have."""
+    return term.effect.on_links or term.effect.by_recording or term.effect.in_intervals
 
 
 def _has(form: Form, power: int) -> bool:

@@ -8,10 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from scara_ident.effects import Member
+from scara_ident.effects.payload import PayloadChange
 from scara_ident.errors import EstimationError
 from scara_ident.estimation.information import Information
 from scara_ident.export.forms import FORMS, Form, friction_said, offset_said, possible_standard, said_by, with_code
-from scara_ident.model.terms import Friction, Offset
+from scara_ident.model.terms import Friction, Offset, RigidBody
 from tests.export.arms import scara
 from tests.export.identified import identified
 
@@ -70,6 +72,32 @@ def test_what_is_missing_is_named_with_why(tmp_path: Path):
     }
     names = dict(said_by(FORMS["urdf"], found, found.standard).missing)
     assert {"armature", "a21, a31, a22, a32", "p_o1, p_o2", "spring of joint2"} < set(names)
+
+
+def test_friction_does_not_stand_in_for_what_was_carried_at_times(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    # In the second half of the states, and not after all of them.
+    monkeypatch.setattr(PayloadChange, "members", lambda self, scene: (Member(None, (30.0 / 1e9,)),))
+    arm = scara(tmp_path)
+    carried = identified(arm, ("payload_change",), samples=60)
+    said = said_by(FORMS["c"], carried)
+    assert said.refitted == ()
+    assert said.missing == (("payload_change", "it was there at times; the arm is written as it is without it"),)
+    term = carried.model.terms[-1]
+    np.testing.assert_array_equal(said.value[: carried.model.place(term).start], carried.value[:-1])
+    assert said.value[-1] == 0.0
+    # What takes the place of a spring is the same whether or not a body was carried in the recordings.
+    both = identified(arm, ("payload_change", "spring"), samples=60)
+    form = Form(bodies=False, powers=(0, 1), armature=True, offset=True, effects=False)
+    said = said_by(form, both)
+    assert said.refitted
+    free = sorted(places(both, Friction) + places(both, Offset))
+    rows, target = both.information.factor[:, :-1], both.information.factor[:, -1]
+    rest = np.zeros_like(both.value)
+    for term in both.model.terms:
+        if isinstance(term, RigidBody) or term.name == "payload_change":
+            rest[both.model.place(term)] = both.value[both.model.place(term)]
+    expected = np.linalg.lstsq(rows[:, free], target - rows @ rest, rcond=None)[0]
+    np.testing.assert_allclose(said.value[free], expected, rtol=1e-6, atol=1e-8)
 
 
 def test_friction_that_no_recording_told_is_not_known(tmp_path: Path):

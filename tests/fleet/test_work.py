@@ -40,7 +40,9 @@ def test_a_later_run_has_the_keys_of_this_one(tmp_path: Path):
     signals = ["position", "velocity", "effort", "temperature"]
     columns = "\n".join(f"  {signal}: {{column: '{{joint}}.{signal}s'}}" for signal in signals)
     urdf = ROOT / "urdf" / "scara03.urdf"
-    description.write_text(f"urdf: {urdf}\neffort_side: joint\nrecording:\n  time: {{column: t}}\n{columns}\n", encoding="utf-8")
+    description.write_text(
+        f"urdf: {urdf}\neffort_side: joint\nrecording:\n  time: {{column: t}}\n{columns}\n", encoding="utf-8"
+    )
     program = f"""
 import pickle
 from hashlib import sha256
