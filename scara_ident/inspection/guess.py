@@ -118,7 +118,7 @@ def guess(
         if behind is not None:
             result.signals["link_position"] = behind
             own = ", ".join(robot.joints[k] for k in behind.columns)
-            said = f"link_position: {behind.template} taken for a second encoder behind the gear of {own}; check it"
+            said = f"link_position: {behind.pattern} taken for a second encoder behind the gear of {own}; check it"
             result.notes.append(said)
     return result
 
@@ -186,14 +186,14 @@ def _find_signal(
     if note:
         result.notes.append(note)
     taken = set(best.columns.values())
-    others = [signal.template for _, signal, _ in found[1:] if not taken & set(signal.columns.values())]
+    others = [signal.pattern for _, signal, _ in found[1:] if not taken & set(signal.columns.values())]
     if others:
-        result.notes.append(f"{quantity}: {best.template} taken, not {', '.join(others[:3])}")
+        result.notes.append(f"{quantity}: {best.pattern} taken, not {', '.join(others[:3])}")
     still = [robot.joints[k] for k, column in best.columns.items() if is_still(numbers[column])]
     if 0 < len(still) < len(best.columns):
         result.notes.append(f"{quantity}: constant for {', '.join(still)}; check its columns")
     if first[0]:
-        result.notes.append(f"{quantity}: {best.template} is by its name a command, not a measurement")
+        result.notes.append(f"{quantity}: {best.pattern} is by its name a command, not a measurement")
     return best
 
 

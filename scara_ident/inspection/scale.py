@@ -14,7 +14,7 @@ from scara_ident.robot.robot import Robot
 
 # Of both sides of the equation, Hz: gravity and inertia of an arm are below, and no choice is needed for a rough scale.
 BAND = 4.0
-# The URDF's torque tells the scale of a joint where it leaves less than this share of what friction alone leaves.
+# The URDF's torque tells the scale of a joint where it leaves less than this share of what friction and a rotor alone leave.
 MOST_LEFT = 0.35
 # A scale within this factor of 1 is what a URDF with rough masses gives.
 USUAL = 2.0
@@ -62,10 +62,13 @@ def _scales(recording: Recording, robot: Robot) -> dict[int, float]:
     for j, rows in enumerate(observations.joints):
         leads = rows.columns < len(stated)
         columns, effort = rows.table[:-1], rows.table[-1]
-        rigid, friction = stated[rows.columns[leads]] @ columns[leads], columns[~leads]
+        own = rows.columns[leads]
+        rigid, friction = stated[own] @ columns[leads], columns[~leads]
         if not np.any(rigid):
             continue
-        with_urdf = np.stack([*friction, rigid], axis=1)
+        # A URDF states no rotor, whose inertia may be as large as the links': what the joint's acceleration alone asks for tells no scale.
+        rotor = base.grouping[own, 10 * robot.n + j] @ columns[leads]
+        with_urdf = np.stack([*friction, rotor, rigid], axis=1)
         value = np.linalg.lstsq(with_urdf, effort, rcond=None)[0]
         without = np.linalg.lstsq(with_urdf[:, :-1], effort, rcond=None)[0]
         left = np.linalg.norm(effort - with_urdf @ value)

@@ -33,6 +33,16 @@ class Signal:
     units: Mapping[int, str] = field(default_factory=dict)
     side: str = "joint"
 
+    @property
+    def pattern(self) -> str:
+        """The template as a robot description has it, where numbers that begin with 0 are an index."""
+        return pattern_of(self.template, self.first_number)
+
+
+def pattern_of(template: str, first_number: int | None) -> str:
+    """Return a template as a robot description has it."""
+    return template.replace("{number}", "{index}") if first_number == 0 else template
+
 
 def groups(quantity: str, meanings: Mapping[str, Meaning], joints: int) -> list[tuple[str, bool, dict[int, str]]]:
     """List the columns that may be one signal: their template, whether joints are told by name, and the columns.
@@ -79,16 +89,17 @@ def of_group(
         return Signal(quantity, dict(sorted(members.items())), template, None), ""
     numbered = sorted(members)
     first = numbered[0]
+    pattern = pattern_of(template, first)
     joints = None if numbered != list(range(first, first + len(numbered))) else numbered_joints(robot, len(numbered))
     if joints is None:
         said = (
-            f"{quantity}: {template} has {len(numbered)} channels for {robot.n} joints: not used without a mapping; name "
+            f"{quantity}: {pattern} has {len(numbered)} channels for {robot.n} joints: not used without a mapping; name "
             "the joints that it has, in --joints"
         )
         return None, said
     note = ""
     if len(numbered) > robot.n:
-        note = f"{quantity}: {template} has {len(numbered)} channels; the first {robot.n} taken, in the joints' order"
+        note = f"{quantity}: {pattern} has {len(numbered)} channels; the first {robot.n} taken, in the joints' order"
     elif robot.n > 1:
-        note = f"{quantity}: {template} matched to the joints by order; check it"
+        note = f"{quantity}: {pattern} matched to the joints by order; check it"
     return Signal(quantity, {k: members[first + place] for place, k in enumerate(joints)}, template, first), note

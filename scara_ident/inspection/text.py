@@ -178,9 +178,7 @@ def _signal(signal: Signal, guess: Guess, robot: Robot) -> dict[str, Any]:
 
 
 def _places(signal: Signal, joints: list[str], columns: list[str], every: int) -> dict[str, Any]:
-    pattern = signal.template
-    if signal.first_number == 0:
-        pattern = pattern.replace("{number}", "{index}")
+    pattern = signal.pattern
     if len(joints) == every and [fill(pattern, joint, index) for index, joint in enumerate(joints)] == columns:
         return {"column": pattern}
     return {"columns": dict(zip(joints, columns, strict=True))}

@@ -17,8 +17,8 @@ from tests.shared import shared_path
 FRICTION = (0.5, 0.2)
 
 
-def recorded(urdf: Path, folder: Path, gains: tuple[float, float]) -> Path:
-    """Twenty seconds of sines at 200 Hz, torque with friction and noise, written down as torque over gain."""
+def recorded(urdf: Path, folder: Path, gains: tuple[float, float], rotor: float = 0.0) -> Path:
+    """Twenty seconds of sines at 200 Hz, torque with friction, noise and a first rotor, written down as torque over gain."""
     model = load_robot(urdf).model
     time = np.arange(4000) / 200.0
     q, v, a = np.zeros((3, 2, 4000))
@@ -27,6 +27,7 @@ def recorded(urdf: Path, folder: Path, gains: tuple[float, float]) -> Path:
         q[j], v[j], a[j] = np.sin(w * time), w * np.cos(w * time), -(w**2) * np.sin(w * time)
     data = model.createData()
     torque = np.array([pin.rnea(model, data, *state) for state in zip(q.T, v.T, a.T, strict=True)]).T
+    torque[0] += rotor * a[0]
     torque += 0.05 * np.random.default_rng(1).standard_normal(torque.shape)
     made = {"time": time}
     for j in range(2):
@@ -74,3 +75,11 @@ def test_the_ur10es_currents_are_told_within_a_third_of_the_published_gains():
         told = float(said.partition(f" N m on {joint}")[0].split()[-1])
         assert told == pytest.approx(published, rel=1 / 3)
     assert "shoulder_pan_joint" not in said
+
+
+def test_a_rotor_that_no_urdf_states_is_not_taken_for_torque_of_the_links(tmp_path: Path):
+    # Its inertia is half of the links', so that an upright axis asks for half as much again.
+    upright = [Link(axis=(0.0, 0.0, 1.0), mass=2.0, com=(0.2, 0.0, 0.0), inertia=(0.01, 0.01, 0.02))]
+    urdf = write_urdf(tmp_path / "arm.urdf", [*upright, PLANAR_2R[1]])
+    (said,) = scale(inspect_file(recorded(urdf, tmp_path, (12.0, 0.25), rotor=0.1), urdf=urdf).notes)
+    assert "12 N m on j1, 0.25 N m on j2" in said
