@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from fsspec import AbstractFileSystem
 
 INSTALL = 'install it with: pip install "scara-ident[fleet]"'
-_DATE = re.compile(r"(?<![0-9])((?:19|20)[0-9]{2})-?([01][0-9])-?([0-3][0-9])(?![0-9])")
+# With hyphens it is meant as one whatever its month and day; digits in a row may be any number.
+_DATE = re.compile(r"(?<![0-9])((?:19|20)[0-9]{2})(?:-([0-9]{2})-([0-9]{2})|-?([01][0-9])-?([0-3][0-9]))(?![0-9])")
 
 
 @dataclass(frozen=True, order=True)
@@ -198,7 +199,7 @@ def _named_dates(place: str) -> Iterator[tuple[str, str | None]]:
     for part in reversed(PurePosixPath(place).parts):
         for match in reversed(list(_DATE.finditer(part))):
             try:
-                yield match[0], date(*map(int, match.groups())).isoformat()
+                yield match[0], date(*(int(part) for part in match.groups() if part is not None)).isoformat()
             except ValueError:
                 yield match[0], None
 

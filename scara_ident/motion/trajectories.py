@@ -83,9 +83,8 @@ def trajectories_of(stretches: Sequence[Stretch]) -> Trajectories:
             labels[k] = label
         called = sorted({stretches[k].trajectory for k in groups[g]})
         if len(called) > 1:
-            notes.append(
-                f"{_listed(names)} have the same motion under the names {_listed(called)}: taken as repetitions"
-            )
+            under = "" if called == names else f" under the names {_listed(called)}"
+            notes.append(f"{_listed(names)} have the same motion{under}: taken as repetitions")
     for name in sorted({stretch.trajectory for stretch in stretches}):
         place = [k for k, stretch in enumerate(stretches) if stretch.trajectory == name]
         motions = len({labels[k] for k in place})

@@ -142,8 +142,13 @@ def sentences(result: Use) -> list[str]:
             words += f" but {', '.join(result.missing)}"
         place = int(np.argmin(np.abs(np.array(result.horizons) - 0.2)))
         if not np.all(np.isfinite(rows[place])):
-            gone = np.any(np.isinf(rows))
-            said.append(f"Simulated {words} the arm {'gets lost' if gone else 'was recorded for too short'}.")
+            if np.any(np.isinf(rows)):
+                said.append(f"Simulated {words} the arm gets lost.")
+            else:
+                said.append(
+                    f"Simulated {words} the arm goes on from no moment of the recording: in none do all joints move, with "
+                    f"{max(result.horizons):g} s to come; give one in which they move at once."
+                )
             continue
         ends = ", ".join(
             f"{joint} {value:.2g} {result.model.robot.position_unit(j)}"

@@ -57,8 +57,8 @@ def rollout_errors(free: Free, part: PreparedStretch, horizons: Sequence[float] 
     Returns
     -------
     ndarray, shape (len(horizons), n)
-        Rms distance of positions, rad or m; NaN where the recording is shorter, infinite where friction drives the simulated
-        arm out of all bounds, as a polynomial can beyond the speeds that it was fitted to.
+        Rms distance of positions, rad or m; NaN where all joints move at no moment before its end, infinite where friction
+        drives the simulated arm out of all bounds, as a polynomial can beyond the speeds that it was fitted to.
     """
     motion, rate = part.motion, part.rate
     longest = round(max(horizons) * rate)

@@ -40,6 +40,7 @@ def test_a_date_that_does_not_exist_is_said_once_with_the_date_taken():
     (said,) = notes("2026-03-01/OJD_2026-02-30_1.csv")
     assert "there is no date 2026-02-30; 2026-03-01 is taken, which is in the path too" in said
     assert len(notes("run_20260230_1.csv")) == 1
+    assert "there is no date 2026-13-45" in notes("2026-13-45/OJD_1.csv")[0]
     # The date taken is the file's own, and digits in a row beside one are any number.
     assert notes("2026-02-30/OJD_2026-03-02_1.csv", "2026-03-01/serial_20011945_1.csv", "OJD_1.csv") == ()
 

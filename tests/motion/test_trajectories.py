@@ -59,6 +59,8 @@ def test_equal_motions_under_other_names_are_repetitions():
     assert found.notes == (
         "morning, noon, noon_2 have the same motion under the names morning, noon: taken as repetitions",
     )
+    pieces = trajectories_of([run(1, "run_part"), run(1, "again_part", seed=1)])
+    assert pieces.notes == ("again_part, run_part have the same motion: taken as repetitions",)
 
 
 def test_an_odd_run_leaves_the_name_to_the_others():

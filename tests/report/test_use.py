@@ -51,6 +51,8 @@ def test_the_words_give_shares_of_the_pids_error() -> None:
     assert "off after 0.2 s by joint1 0.01 rad, joint2 0.02 rad" in others[1]
     lost = replace(result(), rollouts={"identified": np.full((2, 2), np.inf)})
     assert "gets lost" in sentences(lost)[1]
+    nowhere = sentences(replace(result(), rollouts={"identified": np.full((2, 2), np.nan)}))[1]
+    assert "in none do all joints move, with 0.5 s to come; give one in which they move at once" in nowhere
     # What is not simulated is not among the effects that were.
     assert others[1].startswith("Simulated with the effects found but drive_coupling the arm is off")
     assert others[-1] == "Not simulated: drive_coupling."
