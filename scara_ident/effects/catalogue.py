@@ -12,7 +12,7 @@ from scara_ident.effects.elasticity import Backlash, JointElasticity
 from scara_ident.effects.friction import AsymmetricFriction, FrictionCoupling, PositionDependentFriction, Stribeck
 from scara_ident.effects.gear import TransmissionLoss
 from scara_ident.effects.joint_zero import JointZero
-from scara_ident.effects.measurement import TimeDelay, TorqueGainMismatch, TorqueSensorNonlinearity
+from scara_ident.effects.measurement import BentTorqueSensor, TimeDelay, TorqueGainMismatch, TorqueSensorNonlinearity
 from scara_ident.effects.payload import FreePayloadChange, GravityCounterbalance, PayloadChange, PayloadOfRecordings
 from scara_ident.effects.payload_intervals import PayloadInIntervals
 from scara_ident.effects.periodic import EncoderEccentricity, TorqueRipple, Vibration
@@ -46,6 +46,7 @@ CATALOGUE: tuple[Effect, ...] = (
     PayloadOfRecordings(),
     GravityCounterbalance(),
     TorqueSensorNonlinearity(),
+    BentTorqueSensor(),
     TorqueGainMismatch(),
     TimeDelay(),
     DelayOfEachRecording(),

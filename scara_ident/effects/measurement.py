@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -49,6 +49,8 @@ class TorqueSensorNonlinearity(Effect):
     the model fitted together with it.
     """
 
+    power: ClassVar[int] = 3
+
     name = "torque_sensor_nonlinearity"
     summary = "a torque measurement, or torque constant, that depends on the torque"
     coefficients = (Coefficient("cubic", "1/{square}", "cube of the torque in what {joint} records"),)
@@ -65,33 +67,49 @@ class TorqueSensorNonlinearity(Effect):
         return super().words(scene, member) | {"square": f"({unit})^2" if " " in unit else f"{unit}^2"}
 
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
-        """Return the cube of the predicted torque."""
-        return [signals.predicted[member.place] ** 3]
+        """Return the power of the predicted torque."""
+        return [signals.predicted[member.place] ** self.power]
 
     def estimate_slopes(self, signals: Signals, member: Member, value: Array) -> EstimateSlopes:
-        """Return those of the cube."""
+        """Return those of the power."""
         places, rows = predicted_slopes(signals, member.place)
-        return {member.place: (places, 3.0 * value[0] * signals.predicted[member.place] ** 2 * rows)}
+        slope = self.power * value[0] * signals.predicted[member.place] ** (self.power - 1)
+        return {member.place: (places, slope * rows)}
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """Say so where what is recorded does not grow with the torque, up to the largest that the recordings hold."""
-        largest = _largest_torque(scene, member.place)
-        if np.isfinite(largest) and 1.0 + 3.0 * (value[0] + DOUBT_STDS * std[0]) * largest**2 < 0.0:
-            return f"what is recorded would not grow with the torque up to {largest:.2g} {scene.robot.torque_unit(member.place)}"
+        # As near to none as may be.
+        least = np.sign(value[0]) * max(abs(value[0]) - DOUBT_STDS * std[0], 0.0)
+        for torque in _torque_range(scene, member.place):
+            if np.isfinite(torque) and 1.0 + self.power * least * torque ** (self.power - 1) < 0.0:
+                return f"what is recorded would not grow with the torque up to {torque:.2g} {scene.robot.torque_unit(member.place)}"
         return None
 
 
-def _largest_torque(scene: Scene, joint: int) -> float:
-    """Return the largest torque that the base model says of recordings, recorded side; without any the limit.
+class BentTorqueSensor(TorqueSensorNonlinearity):
+    """A torque channel that bends one way: ``recorded = u + square u^2``.
+
+    As where the torque constant, or a sensor's gain, depends on the sign of the torque. Of a joint whose load has one sign the
+    cube does nearly the same, and what it does not, others are taken for.
+    """
+
+    power = 2
+    coefficients = (Coefficient("square", "1/({torque})", "square of the torque in what {joint} records"),)
+
+
+def _torque_range(scene: Scene, joint: int) -> tuple[float, float]:
+    """Return the least and the largest torque that the base model says of recordings, recorded side; without any the limit's.
 
     A channel that bends within the range of the data need not do so by the same law up to the limit, which few recordings reach.
     """
 
-    def found() -> float:
+    def found() -> tuple[float, float]:
         own = scene.value[scene.model.active[joint]]
-        return max(float(np.max(np.abs(own @ rows[joint]), initial=0.0)) for rows in scene.columns.values())
+        torques = [own @ rows[joint] for rows in scene.columns.values()]
+        return min(float(np.min(u, initial=0.0)) for u in torques), max(float(np.max(u, initial=0.0)) for u in torques)
 
-    return shared(scene, ("largest torque", joint), found) if scene.columns else float(scene.robot.torque_limit[joint])
+    limit = float(scene.robot.torque_limit[joint])
+    return shared(scene, ("torque range", joint), found) if scene.columns else (-limit, limit)
 
 
 class TorqueGainMismatch(Effect):

@@ -113,6 +113,8 @@ class PlantDraft:
         Recorded per true torque.
     cubic : ndarray, shape (n,)
         1/(N m)^2, on the recorded side.
+    square : ndarray, shape (n,)
+        1/(N m), on the recorded side.
     drift : ndarray, shape (n,)
         Rate of the recorded torque's offset, N m/s.
     shift : ndarray, shape (n,)
@@ -131,6 +133,7 @@ class PlantDraft:
     delay: Array
     gain: Array
     cubic: Array
+    square: Array
     drift: Array
     shift: Array
     zero: Array
@@ -209,6 +212,7 @@ def empty_draft(n: int, scale: Array, reduction: Array) -> PlantDraft:
         delay=zero.copy(),
         gain=np.ones(n),
         cubic=zero.copy(),
+        square=zero.copy(),
         drift=zero.copy(),
         shift=zero.copy(),
         zero=zero.copy(),

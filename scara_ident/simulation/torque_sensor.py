@@ -48,6 +48,6 @@ def recorded_effort(
         for joint, per_turn, amplitude, phase in draft.pickup:
             if joint == row:
                 u = u + amplitude * np.sin(per_turn * position[i] + phase)
-        u = u + draft.cubic[row] * u**3
+        u = u + draft.square[row] * u**2 + draft.cubic[row] * u**3
         recorded[i] = draft.gain[row] * u + draft.shift[row] + draft.drift[row] * ticks[:-1] * period
     return recorded

@@ -9,6 +9,7 @@ import pytest
 
 from scara_ident.effects import Member, Signals
 from scara_ident.effects.measurement import (
+    BentTorqueSensor,
     PositionFilter,
     TimeDelay,
     TorqueGainMismatch,
@@ -41,6 +42,7 @@ def test_columns_are_the_cube_the_torque_and_its_slope():
     item = moving(scene.robot, 2.0, rate=2000.0)
     u = np.einsum("jpn,p->jn", scene.model.regressor(item), scene.value)
     assert columns(TorqueSensorNonlinearity(), scene, item, Member(1))[1, 0] == pytest.approx(u[1] ** 3)
+    assert columns(BentTorqueSensor(), scene, item, Member(1))[1, 0] == pytest.approx(u[1] ** 2)
     assert columns(TorqueGainMismatch(), scene, item, Member(1))[1, 0] == pytest.approx(u[1])
     # Without the steps of dry friction the slope is smooth.
     smooth = replace(scene, value=np.where(np.char.startswith(scene.model.names, "a"), 0.0, scene.value))
@@ -92,6 +94,16 @@ def test_the_cubic_is_recovered(cubic: float):
     assert found.unit == "1/(N m)^2"
 
 
+@pytest.mark.parametrize("square", [0.02, -0.02])
+def test_the_square_is_recovered(square: float):
+    data = recordings(lambda u, t: np.array([u[0] + square * u[0] ** 2, u[1]]))
+    effect, member = BentTorqueSensor(), Member(0)
+    scene, value, covariance = fit(build_model(load_robot()), data, effect, member, rounds=3)
+    found = effect.parameters(scene, member, value, covariance)["square"]
+    assert found.value == pytest.approx(square, rel=0.02)
+    assert found.unit == "1/(N m)"
+
+
 def test_the_ratio_is_recovered_from_what_the_joints_share():
     data = recordings(lambda u, t: np.array([u[0], 1.12 * u[1]]), noise=0.002)
     effect, member = TorqueGainMismatch(), Member(1)
@@ -128,6 +140,21 @@ def test_impossible_sizes_are_refused():
     # At 2 N m, the limit, what is recorded would fall with the torque.
     assert TorqueSensorNonlinearity().inadmissible(scene, Member(0), np.array([-0.1]), std)
     assert TorqueSensorNonlinearity().inadmissible(scene, Member(0), np.array([-0.08]), std) is None
+
+
+def test_a_channel_that_bends_one_way_may_not_fold_where_the_torque_is():
+    scene, std = scene_of(load_robot()), np.array([1e-4])
+    # At 2 N m, the limit, either way.
+    for square, refused in ((0.24, False), (0.26, True), (-0.24, False), (-0.26, True)):
+        assert bool(BentTorqueSensor().inadmissible(scene, Member(0), np.array([square]), std)) == refused
+    model = scene.model
+    rows = scene.model.joint_columns(moving(scene.robot, 1.0))
+    own = scene.value[model.active[0]]
+    lifted = replace(scene, columns={moving(scene.robot, 1.0): (rows[0] * np.sign(own @ rows[0]), *rows[1:])})
+    largest = float(np.max(np.abs(own @ rows[0])))
+    # A load of one sign leaves the other side open.
+    assert BentTorqueSensor().inadmissible(lifted, Member(0), np.array([0.6 / largest]), std) is None
+    assert BentTorqueSensor().inadmissible(lifted, Member(0), np.array([-0.6 / largest]), std)
 
 
 def test_a_channel_may_bend_by_another_law_beyond_what_was_recorded():

@@ -31,16 +31,17 @@ class TimeDelay(Effect):
 
 @dataclass(frozen=True)
 class TorqueSensorNonlinearity(Effect):
-    """A torque that is recorded as ``u + cubic u^3``."""
+    """A torque that is recorded as ``u + square u^2 + cubic u^3``."""
 
     name: ClassVar[str] = "torque_sensor_nonlinearity"
-    units: ClassVar[dict[str, str]] = {"cubic": "1/(N m)^2"}
-    arrays: ClassVar[dict[str, str]] = {"cubic": "cubic"}
+    units: ClassVar[dict[str, str]] = {"cubic": "1/(N m)^2", "square": "1/(N m)"}
+    arrays: ClassVar[dict[str, str]] = {"cubic": "cubic", "square": "square"}
     cubic: float = BY_ARM
+    square: float = 0.0
 
     def sizes(self, arm: VirtualArm, joint: int) -> dict[str, float]:
-        """Give a tenth at the usual torque."""
-        return {"cubic": float(0.1 / arm.torque_scale[joint] ** 2)}
+        """Give a cubic of a tenth at the usual torque, where no square is given."""
+        return {"cubic": 0.0 if self.square else float(0.1 / arm.torque_scale[joint] ** 2)}
 
 
 @dataclass(frozen=True)

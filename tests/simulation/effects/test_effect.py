@@ -35,6 +35,7 @@ NOTHING = [
     fx.PayloadChange(mass=0.0, time=0.3),
     fx.TimeDelay(delay=0.0),
     fx.TorqueSensorNonlinearity(cubic=0.0),
+    fx.TorqueSensorNonlinearity(cubic=0.0, square=0.0),
     fx.TorqueGainMismatch(ratio=1.0),
     fx.Backlash(width=0.0),
     fx.EncoderEccentricity(amplitude=0.0),

@@ -35,6 +35,8 @@ def test_sensor_effects_change_the_record_alone() -> None:
     assert u is not None
     cases = {
         fx.TorqueSensorNonlinearity("joint1", 0.3): (0, u[0] + 0.3 * u[0] ** 3),
+        fx.TorqueSensorNonlinearity("joint1", square=0.3): (0, u[0] + 0.3 * u[0] ** 2),
+        fx.TorqueSensorNonlinearity("joint1", 0.2, 0.3): (0, u[0] + 0.3 * u[0] ** 2 + 0.2 * u[0] ** 3),
         fx.TorqueGainMismatch("joint2", 1.2): (1, 1.2 * u[1]),
         fx.OffsetDrift("joint1", 0.02): (0, u[0] + 0.02 * t),
         fx.TorqueRipple("joint2", 1.0, 0.03, 0.4, sensor=True): (
