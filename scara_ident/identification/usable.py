@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 
@@ -23,6 +25,10 @@ from scara_ident.threads import side_by_side
 
 # A recording of which more was recorded before is a copy of that, whatever else it holds.
 MOSTLY = 0.5
+# Recordings that a note lists by name; of more the same is said once, with the numbers of the first.
+LISTED = 3
+# A number that stands alone, and not within a name.
+_NUMBER = re.compile(r"(?<![\w.])[-+]?\d[\w.+-]*")
 # An rms of so many independent values is known to 1 / sqrt(2 N), here 22 % (the standard error of a standard deviation).
 LEAST_ROWS = 10
 
@@ -185,15 +191,25 @@ def check_rows(observations: Observations) -> None:
 
 def data_notes(*data: PreparedData) -> list[str]:
     """Return what the audits found, the same remark on many recordings in one line, and where names contradict motions."""
-    found: dict[str, list[str]] = {}
+    found: dict[str, dict[str, list[str]]] = {}
     items = [item for part in data for item in part.recordings]
     audits = side_by_side(lambda item: audit_velocity(item.recording, item.longest.stretch), items)
     for item in items:
         for finding in item.recording.findings:
-            found.setdefault(finding.message, []).append(item.name)
-    notes = [f"{_listed(names)}: {remark}" for remark, names in found.items()]
+            alike = found.setdefault(_NUMBER.sub("", finding.message), {})
+            alike.setdefault(finding.message, []).append(item.name)
+    notes = [note for alike in found.values() for note in _in_one(alike)]
     notes += _velocity_notes(items, audits)
     return [*notes, *(note for part in data for note in part.motions.notes)]
+
+
+def _in_one(alike: Mapping[str, Sequence[str]]) -> list[str]:
+    """Return remarks that differ by their numbers, each with its recordings, or one for all where they are many."""
+    names = list(dict.fromkeys(chain.from_iterable(alike.values())))
+    if len(alike) == 1 or len(names) <= LISTED:
+        return [f"{_listed(own)}: {remark}" for remark, own in alike.items()]
+    first, own = next(iter(alike.items()))
+    return [f"{_listed(names)}: {first}; numbers of {own[0]}"]
 
 
 def _velocity_notes(items: Sequence[PreparedRecording], audits: Sequence[Sequence[VelocityAudit]]) -> list[str]:
@@ -212,5 +228,5 @@ def _velocity_notes(items: Sequence[PreparedRecording], audits: Sequence[Sequenc
     ]
 
 
-def _listed(names: Sequence[str], most: int = 3) -> str:
-    return ", ".join(names) if len(names) <= most else f"{names[0]} and {len(names) - 1} more recordings"
+def _listed(names: Sequence[str]) -> str:
+    return ", ".join(names) if len(names) <= LISTED else f"{names[0]} and {len(names) - 1} more recordings"

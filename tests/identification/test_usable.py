@@ -15,6 +15,7 @@ from scara_ident.identification.identify import identify, known_information
 from scara_ident.identification.usable import check_rows, data_notes, usable_data, with_rows, without_copies
 from scara_ident.model.model import build_model
 from scara_ident.motion.prepared import prepare
+from scara_ident.recording.audit.samples import Finding
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import Robot, load_robot
 from tests.arms import recorded_torque, recording, sines
@@ -212,3 +213,26 @@ def test_a_recording_that_holds_some_of_another_is_only_named(robot: Robot):
     assert kept == [first, longer]
     # Of 3000 windows those over the seam are nobody's.
     assert notes == ["B_1: 19% of its samples are those of A_1, and count twice; give each once"]
+
+
+def test_a_remark_on_many_recordings_is_one_line_with_the_numbers_of_the_first(robot: Robot):
+    """Eight logs of a jittery recorder had twenty-four notes before the verdict."""
+
+    def said(count: int, *messages: str) -> list[str]:
+        items = [
+            replace(
+                moving(robot, f"run_{k + 1}", k),
+                findings=tuple(Finding("jitter", text.format(k + 3)) for text in messages),
+            )
+            for k in range(count)
+        ]
+        return [note for note in data_notes(prepare(items)) if "stamps" in note]
+
+    other = "joint1.effort has no stamps in {} rows"
+    few = said(3, other)
+    assert few == [f"run_{k + 1}: joint1.effort has no stamps in {k + 3} rows" for k in range(3)]
+    assert said(5, other) == ["run_1 and 4 more recordings: joint1.effort has no stamps in 3 rows; numbers of run_1"]
+    # Another joint is another remark, and what all have alike is said as it is.
+    both = said(5, other, other.replace("joint1", "joint2"))
+    assert len(both) == 2 and "joint2.effort" in both[1]
+    assert said(5, "no stamps in 7 rows") == ["run_1 and 4 more recordings: no stamps in 7 rows"]
