@@ -23,9 +23,11 @@ from pathlib import Path
 import numpy as np
 from fleet import DAILY, FAULTS, FLEET, MONTHS, SlowFault, date_name, first_at, is_right, run_of_fleet, with_dates
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 from scipy.special import ndtr
 
 from scara_ident.arrays import Array
+from scara_ident.fleet.causes import TOLD_RUNS
 from scara_ident.fleet.changes import LEVEL, arms_counted, least_probability, trials_of
 from scara_ident.fleet.fleet import changes_of
 from scara_ident.fleet.folder import list_fleet
@@ -76,15 +78,16 @@ def design() -> Design:
 
 
 def daily() -> Array:
-    """Return the standard deviations of `scara_ident.fleet.causes.RUN_KINDS`, joint by joint."""
-    return np.ravel([(DAILY[0], DAILY[1], DAILY[2] * noise, DAILY[3]) for noise in virtual_arm().torque_noise])
+    """Return a root of the covariance of `scara_ident.fleet.causes.RUN_KINDS`, joint by joint: all friction of a joint together."""
+    each = [(DAILY[0], DAILY[1], DAILY[2] * noise, DAILY[3]) for noise in virtual_arm().torque_noise]
+    return block_diag(*(TOLD_RUNS * std for std in each))
 
 
 def drawn(known: Design, random: np.random.Generator, faulty: bool) -> Array:
     """Draw a fleet's torque in units of the noise, shape (arms, dates, rows)."""
-    row = known.row
-    runs = daily() * random.standard_normal((FLEET, MONTHS, row.runs.shape[1]))
-    torque = random.standard_normal((FLEET, MONTHS, len(row.torque))) + runs @ row.runs.T
+    row, along = known.row, known.row.runs @ daily()
+    runs = random.standard_normal((FLEET, MONTHS, along.shape[1]))
+    torque = random.standard_normal((FLEET, MONTHS, len(row.torque))) + runs @ along.T
     for arm, fault in FAULTS.items() if faulty else ():
         torque[arm] += np.outer([fault.at(month) for month in range(MONTHS)], known.along(fault))
     return torque

@@ -15,8 +15,11 @@ from scara_ident.effects.parameters import Parameter
 from scara_ident.model.model import TorqueModel
 from scara_ident.model.terms.friction import Friction, Offset
 
-# Sizes that differ from run to run on any arm: they are weighed as noise.
-RUN_KINDS = ("friction", "torque_scale", "offset", "delay")
+# Sizes that differ from run to run on any arm: they are weighed as noise. What grows with speed follows the lubricant, the
+# rest of friction the preload: they need not differ together, and what they share is estimated.
+RUN_KINDS = ("coulomb", "speed", "torque_scale", "offset", "delay")
+# What these make of friction as a whole and of torque scale, as a table has them beside each other.
+TOLD_RUNS = np.array([[1, 0, 0, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]], dtype=float)
 # Friction of these powers of speed is also looked at alone; of higher ones a recording says little.
 ALONE = 2
 # A parameter below so many standard deviations is no size that a share can be taken of.
@@ -104,6 +107,8 @@ def causes_of(
                 unit = np.zeros((total, 1))
                 unit[k] = value[k] if told else 1.0
                 cause(str(kinds[k]), j, column.meaning, unit, ("1" if told else column.unit,), j)
+        if np.any(model.constants[j]) and not np.any(own & (kinds == "offset")):
+            cause("offset", j, f"torque offset of {joint}", model.constants[j][:, None], (robot.torque_unit(j),), j)
     place = np.flatnonzero(kinds == "inertia")
     if len(place):
         whole = np.zeros((total, len(place)))
@@ -126,24 +131,25 @@ def causes_of(
 def run_directions(
     model: TorqueModel, value: Array, columns: Sequence[NDArray[np.intp]], effects: int
 ) -> tuple[Array, ...]:
-    """Return for each joint what one unit of each of `RUN_KINDS` is as a sum of its columns, shape (k, 4).
+    """Return for each joint what one unit of each of `RUN_KINDS` is as a sum of its columns, shape (k, 5).
 
     Parameters
     ----------
     effects : int
         Columns of watched effects, between the model's and those of the delays.
     """
-    kinds, total = _kinds(model), len(model.columns)
+    total = len(model.columns)
+    coulomb, speed = np.zeros((2, total))
+    for term in model.terms:
+        if isinstance(term, Friction):
+            coulomb[model.place(term)] = term.of_power(0)
+            speed[model.place(term)] = ~term.of_power(0)
     found = []
     for j, own in enumerate(columns):
-        weights = np.zeros((len(own), len(RUN_KINDS)))
-        for row, k in enumerate(own):
-            if k < total:
-                weights[row] = [kinds[k] == "friction", 1.0, 0.0, 0.0]
-                weights[row] *= value[k]
-                weights[row, 2] = float(kinds[k] == "offset")
-            elif k == total + effects + j:
-                weights[row, 3] = 1.0
+        # An offset also where bodies' weight stands for it: if not, one that differs from date to date is another mass each time.
+        whole = np.stack([coulomb * value, speed * value, value, model.constants[j], np.zeros(total)], axis=1)
+        weights = _spread(whole, own)
+        weights[own == total + effects + j, RUN_KINDS.index("delay")] = 1.0
         found.append(weights)
     return tuple(found)
 

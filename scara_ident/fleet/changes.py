@@ -93,29 +93,46 @@ def find_changes(history: History, scatter: Scatter, tried: float) -> tuple[Chan
     if len(history.dates) < 2:
         return ()
     search = first = _search(history, scatter)
-    found: list[tuple[_Trial, tuple[Cause, ...]]] = []
-    while len(found) < MOST_CAUSES:
+    found: list[_Named] = []
+    for _ in range(MOST_CAUSES):
         trials = search.in_order(history.causes)
         if not trials or trials[0].p_value * tried >= LEVEL:
             break
         best, sizes = trials[0], history.causes[trials[0].cause].sizes
         enough = sizes * float(fdtri(sizes, scatter.freedom, 1.0 - AS_GOOD))
         alike = tuple(history.causes[item.cause] for item in trials[1:] if best.explained - item.explained < enough)
-        found.append((best, alike))
-        search = search.without(best)
+        found = _needed([*found, _Named(best, best, alike)], first, history.causes, tried)
+        search = first.beside(found)
     named = []
-    for trial, alike in found:
-        search = first
-        for other, _ in found:
-            if other is not trial:
-                search = search.without(other)
-        cause, shape = history.causes[trial.cause], first.shapes[trial.shape]
-        start, gradual, _ = shape
-        beside = replace(search, shapes=[shape]).best(trial.cause, cause) or trial
-        chance = min(1.0, trial.p_value * tried)
-        since = history.dates[start]
-        named.append(Change(cause, cause.joint, since, gradual, beside.size, beside.covariance, chance, alike))
+    for item in found:
+        cause, (start, gradual, _), beside = (
+            history.causes[item.trial.cause],
+            first.shapes[item.trial.shape],
+            item.beside,
+        )
+        chance, since = min(1.0, beside.p_value * tried), history.dates[start]
+        named.append(Change(cause, cause.joint, since, gradual, beside.size, beside.covariance, chance, item.alike))
     return tuple(named)
+
+
+def _needed(found: Sequence[_Named], first: _Search, causes: Sequence[Cause], tried: float) -> list[_Named]:
+    """Return what is still sure beside all others, with its size beside them: what came later may be what came first, and more.
+
+    Of friction that is told as a whole first, and then as its Coulomb part, nothing may be left of the whole.
+    """
+    left = list(found)
+    while left:
+        each = [
+            replace(first.beside([other for other in left if other is not item]), shapes=[first.shapes[item.trial.shape]])
+            .best(item.trial.cause, causes[item.trial.cause])
+            for item in left
+        ]  # fmt: skip
+        chances = [np.inf if trial is None else trial.p_value for trial in each]
+        worst = int(np.argmax(chances))
+        if chances[worst] * tried < LEVEL:
+            return [replace(item, beside=trial) for item, trial in zip(left, each, strict=True) if trial is not None]
+        del left[worst]
+    return []
 
 
 def arms_counted(probabilities: Sequence[float]) -> float:
@@ -227,6 +244,15 @@ class _Trial:
     covariance: Array
 
 
+@dataclass(frozen=True, eq=False)
+class _Named:
+    """What was found at one step, what it is beside all that was found, and the causes that it was not told from."""
+
+    trial: _Trial
+    beside: _Trial
+    alike: tuple[Cause, ...]
+
+
 def _shapes(days: Array) -> Iterator[tuple[int, bool, Array]]:
     """Give the first date that differs, whether it grows from then on, and the share of its last size on every date."""
     count = len(days)
@@ -272,6 +298,13 @@ class _Search:
         """Return the best shape of each cause, the best explanation first."""
         each = (self.best(k, cause) for k, cause in enumerate(causes))
         return sorted((trial for trial in each if trial is not None), key=lambda item: item.order)
+
+    def beside(self, found: Sequence[_Named]) -> _Search:
+        """Return the search beside all that was found."""
+        search = self
+        for item in found:
+            search = search.without(item.trial)
+        return search
 
     def without(self, trial: _Trial) -> _Search:
         """Return the search beside a cause that was found."""

@@ -39,7 +39,7 @@ class DateRows:
     torque : ndarray, shape (R,)
     directions : tuple of ndarray, shape (R, s)
         Of each cause.
-    runs : ndarray, shape (R, 4 n)
+    runs : ndarray, shape (R, 5 n)
         What one unit of each of `RUN_KINDS` does, joint by joint.
     """
 
@@ -48,9 +48,9 @@ class DateRows:
     directions: tuple[Array, ...]
     runs: Array
 
-    def whitened(self, std: Array) -> DateRows:
-        """Return the rows with what differs from run to run weighed as the noise it is, std of shape (4 n,)."""
-        pull = self.runs * std
+    def whitened(self, root: Array) -> DateRows:
+        """Return the rows with what differs from run to run weighed as the noise it is, of covariance ``root @ root.T``."""
+        pull = self.runs @ root
         values, vectors = np.linalg.eigh(pull.T @ pull)
         kept = values > UNDETERMINED * max(float(values[-1]), np.finfo(float).tiny)
         if not np.any(values[kept] > 0.0):
@@ -108,19 +108,30 @@ class History:
         return np.asarray((days - days[0]).astype(float))
 
     @cached_property
-    def run_sizes(self) -> tuple[Array, Array]:
-        """By how much each date differs in `RUN_KINDS` from all together, and its variance, shape (dates, 4 n) each."""
-        left = common_removed(self.rows)[0]
-        sizes, variances = [], []
-        for row, rest in zip(self.rows, left, strict=True):
-            inverse = _inverse(row.runs.T @ row.runs)
-            sizes.append(inverse @ (row.runs.T @ rest))
-            variances.append(np.where(np.diag(inverse) > 0.0, np.diag(inverse), np.nan))
-        return np.array(sizes), np.array(variances)
+    def _left(self) -> list[Array]:
+        return common_removed(self.rows)[0]
 
-    def whitened(self, std: Array) -> tuple[DateRows, ...]:
-        """Return the rows with the differences between runs weighed as noise."""
-        return tuple(row.whitened(std) for row in self.rows)
+    def run_sizes(self, kinds: Array) -> tuple[Array, Array]:
+        """Return by how much each date differs from all together, and the covariance: shapes (dates, k n) and (dates, k n, k n).
+
+        Parameters
+        ----------
+        kinds : ndarray, shape (5, k)
+            Sums of `RUN_KINDS`, the same on each joint.
+        """
+        turn = np.kron(np.eye(self.model.robot.n), kinds)
+        sizes, covariances = [], []
+        for row, rest in zip(self.rows, self._left, strict=True):
+            pull = row.runs @ turn
+            inverse = _inverse(pull.T @ pull)
+            sizes.append(inverse @ (pull.T @ rest))
+            unknown = np.diag(inverse) <= 0.0
+            covariances.append(np.where(unknown | unknown[:, None], np.nan, inverse))
+        return np.array(sizes), np.array(covariances)
+
+    def whitened(self, root: Array) -> tuple[DateRows, ...]:
+        """Return the rows with the differences between runs weighed as noise, see `DateRows.whitened`."""
+        return tuple(row.whitened(root) for row in self.rows)
 
     def _rows(self, visit: Visit) -> DateRows:
         count = self._effect_columns
@@ -166,33 +177,13 @@ def common_removed(rows: Sequence[DateRows]) -> tuple[list[Array], list[Array]]:
     return np.split(left, ends), np.split(basis, ends)
 
 
-def run_scatter(histories: Sequence[History]) -> tuple[Array, float]:
-    """Return the standard deviation of each of `RUN_KINDS` from date to date, joint by joint, and its degrees of freedom.
-
-    Parameters
-    ----------
-    histories : sequence of History
-        Of one robot and model.
-
-    Returns
-    -------
-    std : ndarray, shape (4 n,)
-    """
-    several = [item for item in histories if len(item.dates) > 1]
-    if not several:
-        return np.zeros(len(RUN_KINDS) * histories[0].model.robot.n if histories else 0), 0.0
-    steps = np.concatenate([np.diff(item.run_sizes[0], axis=0) for item in several])
-    noise = np.concatenate([item.run_sizes[1][1:] + item.run_sizes[1][:-1] for item in several])
-    return np.sqrt(scatter(steps, noise)), freedom_of(len(steps))
-
-
 def freedom_of(steps: int) -> float:
     """Return the degrees of freedom of a scatter that so many differences told."""
     return max(1.0, EFFICIENCY * steps)
 
 
 def scatter(steps: Array, noise: Array) -> Array:
-    """Return the variance of one date beyond its noise, from differences between neighbouring dates.
+    """Return the variance of one date beyond its noise, from differences between neighbouring dates; 0 where that is none.
 
     Parameters
     ----------
@@ -201,6 +192,11 @@ def scatter(steps: Array, noise: Array) -> Array:
     noise : ndarray, shape (N, k)
         Their variance by noise alone.
     """
+    return np.maximum(0.0, beyond_noise(steps, noise))
+
+
+def beyond_noise(steps: Array, noise: Array) -> Array:
+    """Return the same as `scatter`, below zero where differences are smaller than their noise."""
     with np.errstate(invalid="ignore"):
         known = np.isfinite(steps) & np.isfinite(noise)
     found = np.zeros(steps.shape[1])
@@ -209,7 +205,7 @@ def scatter(steps: Array, noise: Array) -> Array:
         if len(own):
             size = np.median(np.abs(own)) / NORMAL_MEDIAN
             kept = own[np.abs(own) <= CUT * size]
-            found[k] = max(0.0, 0.5 * float(np.mean(kept**2) / LEFT - np.median(var)))
+            found[k] = 0.5 * float(np.mean(kept**2) / LEFT - np.median(var))
     return found
 
 

@@ -14,9 +14,9 @@ from scara_ident.fleet.history import (
     History,
     common_removed,
     pseudo_inverses,
-    run_scatter,
     variance_prior,
 )
+from scara_ident.fleet.runs import run_scatter
 
 # Causes of which runs are less than this share of the variance tell each other how much larger than noise it is.
 BY_RUNS = 0.5
@@ -30,8 +30,8 @@ class Scatter:
 
     Attributes
     ----------
-    runs : ndarray, shape (4 n,)
-        Standard deviations, see `run_scatter`.
+    runs : ndarray, shape (5 n, 11 n)
+        A root of the covariance of runs, see `run_scatter`.
     causes : mapping of str to ndarray, shape (s,)
         By a cause's label how much larger than their noise differences of each of its sizes are, as a ratio of squares, at
         least 1: a tilt about one axis may differ from date to date and that about the other not.

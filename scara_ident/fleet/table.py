@@ -11,7 +11,7 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.estimation.information import triangular
-from scara_ident.fleet.causes import Cause, sizes_in_words
+from scara_ident.fleet.causes import TOLD_RUNS, Cause, sizes_in_words
 from scara_ident.fleet.changes import Change
 from scara_ident.fleet.folder import Fault
 from scara_ident.fleet.history import History, noise_of, pseudo_inverses, scatter
@@ -169,12 +169,12 @@ def _of_date(
         for name, item in each.items():
             own = (item.value, item.std) if told else (np.nan, np.inf)
             yield Quantity(f"{name}: {cause.label}", cause.joint, item.unit, *own, cause.label)
-    sizes, variances = (part[k] for part in history.run_sizes)
+    sizes, covers = (part[k] for part in history.run_sizes(TOLD_RUNS))
     for j, joint in enumerate(model.robot.joints):
         for kind, words in enumerate((f"friction of {joint}", f"torque scale of {joint}")):
-            place = 4 * j + kind
-            if words in labels and np.isfinite(variances[place]):
-                std = float(np.sqrt(variances[place]))
+            place = TOLD_RUNS.shape[1] * j + kind
+            if words in labels and np.isfinite(covers[place, place]):
+                std = float(np.sqrt(covers[place, place]))
                 yield Quantity(words, joint, "1", 1.0 + float(sizes[place]), std, labels[words])
 
 

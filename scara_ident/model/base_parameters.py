@@ -289,6 +289,18 @@ def constant_torques(robot: Robot) -> tuple[int, ...]:
     return tuple(found)
 
 
+def constant_as_bodies(robot: Robot, base: BaseParameters, joint: int) -> Array:
+    """Return the base parameters, shape (b,), that make a constant torque of 1 on one of `constant_torques` and none elsewhere."""
+    columns = _random_columns(robot, 0)[:, base.kept]
+    size = np.linalg.norm(columns, axis=0)
+    constant = np.zeros(len(columns))
+    constant[joint :: robot.n] = 1.0
+    shares = np.linalg.lstsq(columns / size, constant, rcond=RANK_TOLERANCE)[0]
+    # Of the others there is rounding.
+    shares[np.abs(shares) < RANK_TOLERANCE * np.max(np.abs(shares))] = 0.0
+    return np.asarray(shares / size)
+
+
 @dataclass(frozen=True)
 class BaseCheck:
     """Outcome of `check_base_parameters`.

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scara_ident.arrays import Array
 from scara_ident.manners import Frozen
 from scara_ident.model import MODELS
+from scara_ident.model.base_parameters import constant_as_bodies
 from scara_ident.model.terms import Column, Friction, Offset, RigidBody, Term
 from scara_ident.model.terms.friction import offset
 from scara_ident.model.terms.rigid_body import rigid_body
@@ -71,6 +72,21 @@ class TorqueModel(Frozen):
                 return slice(start, start + len(other.columns))
             start += len(other.columns)
         raise ValueError(f"the model {self.name} has no such term: {term.name}")
+
+    @cached_property
+    def constants(self) -> Array:
+        """What one unit of offset of each joint is on its rows as a sum of the columns, shape (n, p).
+
+        Where weight stands for it (`Offset.left_out`) that is a sum of bodies; zero for a model without offsets.
+        """
+        weights = np.zeros((self.robot.n, len(self.columns)))
+        for term in (term for term in self.terms if isinstance(term, Offset)):
+            weights[list(term.places), self.place(term)] = np.eye(len(term.places))
+            for joint in term.left_out:
+                body = self.rigid_body
+                made = constant_as_bodies(self.robot, body.base, joint) / self.robot.row_scale[joint]
+                weights[joint, self.place(body)] = made[body.kept]
+        return weights
 
     def regressor(self, motion: Motion) -> Array:
         """Return the regressor of a stretch of motion.

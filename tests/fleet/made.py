@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 
-from scara_ident.fleet.history import noise_of
-from scara_ident.fleet.visit import Visit
+from scara_ident.fleet.history import History, noise_of
+from scara_ident.fleet.visit import Visit, _visit
+from scara_ident.model.model import build_model
 from scara_ident.paper import OJD, table5_parameters
 from scara_ident.recording.recording import Recording, write_recording
-from scara_ident.robot.robot import load_robot
-from tests.arms import noisy, recorded_torque, recording
+from scara_ident.robot.robot import Robot, load_robot
+from tests.arms import noisy, recorded_torque, recording, sines
+from tests.excitation.made import scara_with_quill
 
 RATE, SECONDS = 200.0, 10.0
 DATES = ("2026-01-15", "2026-02-15", "2026-03-15", "2026-04-15", "2026-05-15", "2026-06-15")
@@ -64,3 +67,42 @@ def drawn(first: Visit, random: np.random.Generator) -> Visit:
         own[:known, known] = noise_of(factor, rows) * random.standard_normal(known)
         factors.append(own)
     return replace(first, factors=tuple(factors))
+
+
+@cache
+def _quill_parts(speed: float) -> tuple[Robot, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    robot, time = scara_with_quill(), np.arange(round(SECONDS * RATE)) / RATE
+    q, v, a = sines(np.random.default_rng(3), time, 3, lowest=speed)
+    rigid = recorded_torque(robot, q, v, a, [(0.0,) * 5] * 3)
+    own = robot.drive_sign[:, None] * v
+    return robot, time, q, rigid, np.array([np.sign(own), own])
+
+
+def quill_fleet(seed: int, scatter: Sequence[float], gain: float = 0.0, speed: float = 0.3) -> tuple[History, ...]:
+    """Four arms whose last joint goes up and down, on six dates.
+
+    Parameters
+    ----------
+    scatter : sequence of float
+        Standard deviations from date to date of Coulomb friction, viscous friction and torque scale, as shares and each of its own,
+        and of the offset of the last joint as a share of its weight.
+    gain : float
+        By what share of its torque joint 2 of `WORN` is recorded as more from the fourth date on.
+    """
+    robot, time, q, rigid, each = _quill_parts(speed)
+    model, random, found = build_model(robot), np.random.default_rng(seed), []
+    noise = 0.01 * np.sqrt(np.mean(rigid**2, axis=1))
+    friction = 0.2 * np.sqrt(np.mean(rigid**2, axis=1) / np.mean(each**2, axis=2))
+    for arm in ("arm1", WORN, "arm3", "arm4"):
+        visits: list[Visit] = []
+        for k in range(len(DATES)):
+            share = 1.0 + np.array(scatter[:3])[:, None] * random.standard_normal((3, 3))
+            torque = rigid + np.einsum("pj,pjt->jt", friction * share[:2], each)
+            torque *= share[2][:, None]
+            torque[2] += scatter[3] * np.mean(rigid[2]) * random.standard_normal()
+            if arm == WORN and k >= 3:
+                torque[1] *= 1.0 + gain
+            run = noisy(recording(robot, "swing_1", time, q, torque), random, noise)
+            visits.append(_visit(model, [run], visits[0].reference if visits else None))
+        found.append(History(arm, DATES, tuple(visits), model))
+    return tuple(found)

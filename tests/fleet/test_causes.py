@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from scara_ident.fleet.causes import RUN_KINDS, run_directions, sizes_in_words
-from tests.fleet.made import DATES
+from scara_ident.fleet.causes import RUN_KINDS, TOLD_RUNS, run_directions, sizes_in_words
+from tests.fleet.made import DATES, quill_fleet
 
 
 def test_the_direction_of_a_share_is_that_share_of_the_parameters(histories):
@@ -34,15 +34,19 @@ def test_every_cause_has_a_name_of_its_own_and_acts_somewhere(histories):
     assert len(used) == len(set(used))
 
 
-def test_what_differs_from_run_to_run_has_four_directions_on_each_joint(histories):
+def test_what_differs_from_run_to_run_has_five_directions_on_each_joint(histories):
     history = histories[0]
     first = history.visits[0]
     effects = max(own.max() for own in first.columns) + 1 - len(history.model.columns) - 2
     rows = run_directions(history.model, history.scene.value, first.columns, effects)
     for j, (own, weights) in enumerate(zip(first.columns, rows, strict=True)):
         assert weights.shape == (len(own), len(RUN_KINDS))
-        assert np.count_nonzero(weights[:, 2]) == 1 == np.count_nonzero(weights[:, 3])
-        assert own[np.argmax(weights[:, 3])] == len(history.model.columns) + effects + j
+        assert np.count_nonzero(weights[:, 3]) == 1 == np.count_nonzero(weights[:, 4])
+        assert own[np.argmax(weights[:, 4])] == len(history.model.columns) + effects + j
+        # Coulomb friction, and all of it that grows with speed.
+        assert [np.count_nonzero(weights[:, part]) for part in (0, 1)] == [1, 3]
+        friction = next(cause for cause in history.causes if cause.words == f"friction of joint{j + 1}")
+        np.testing.assert_array_equal((weights @ TOLD_RUNS)[:, 0], friction.weights[j][:, 0])
     assert len(history.dates) == len(DATES)
 
 
@@ -55,3 +59,14 @@ def test_sizes_are_told_as_an_effects_parameters(histories):
     assert told["amplitude"].unit == "N m"
     own = sizes_in_words(history.causes[0], history.scene, np.array([0.1]), np.array([[1e-4]]))
     assert own[""].value == 0.1 and own[""].unit == "1"
+
+
+def test_an_offset_that_weight_stands_for_is_a_cause_of_its_own_and_differs_from_run_to_run():
+    history = quill_fleet(0, (0.0, 0.0, 0.0, 0.0))[0]
+    joint = history.model.robot.joints[2]
+    (offset,) = (cause for cause in history.causes if cause.effect == "offset" and cause.joint == joint)
+    assert offset.words == f"torque offset of {joint}" and offset.units == (history.model.robot.torque_unit(2),)
+    rows = history.rows[0]
+    k = history.causes.index(offset)
+    assert np.linalg.norm(rows.directions[k]) > 0.0
+    np.testing.assert_allclose(rows.runs[:, len(RUN_KINDS) * 2 + RUN_KINDS.index("offset")], rows.directions[k][:, 0])

@@ -9,6 +9,8 @@ import pytest
 
 from scara_ident.fleet.changes import (
     LEVEL,
+    _Named,
+    _needed,
     _search,
     find_changes,
     grown_residuals,
@@ -67,6 +69,21 @@ def test_a_cause_that_changes_twice_has_the_size_of_each_step(histories):
     # Their standard deviations are 0.0002: friction differs from date to date.
     sizes = {item.since: pytest.approx(item.size[0], abs=0.002) for item in found}
     assert sizes == {DATES[1]: 0.05, DATES[3]: 0.25}
+
+
+def test_what_came_first_is_not_named_where_a_later_cause_leaves_nothing_of_it(histories, noise):
+    """Friction as a whole was named with 0.6 % (± 1 %) beside its Coulomb part, which was what had grown."""
+    worn, search = histories[1], _search(histories[1], noise)
+    labels = [cause.label for cause in worn.causes]
+    both = []
+    for label in ("friction of joint2", "Coulomb friction of joint2"):
+        trial = search.best(labels.index(label), worn.causes[labels.index(label)])
+        assert trial is not None and trial.p_value * 400.0 < LEVEL
+        both.append(_Named(trial, trial, ()))
+    (left,) = _needed(both, search, worn.causes, 400.0)
+    assert left.trial is both[1].trial
+    np.testing.assert_allclose(left.beside.size, left.trial.size)
+    assert _needed(both[:1], search, worn.causes, 400.0)[0].trial is both[0].trial
 
 
 def test_where_dates_differ_more_by_nature_less_is_named(histories, noise):

@@ -13,6 +13,7 @@ from scara_ident.model.model import build_model
 from scara_ident.model.terms import Offset
 from scara_ident.robot.robot import load_robot
 from tests.arms import PLANAR_2R, motion, write_urdf
+from tests.excitation.made import scara_with_quill
 
 PAPER = tuple(parameter.name for parameter in paper.PARAMETERS)
 
@@ -80,3 +81,13 @@ def test_names_are_unique(tmp_path: Path):
     for robot in (load_robot(), load_robot(write_urdf(tmp_path / "arm.urdf", PLANAR_2R))):
         names = build_model(robot).names
         assert len(set(names)) == len(names)
+
+
+def test_an_offset_is_a_sum_of_columns_also_where_weight_stands_for_it():
+    for robot in (load_robot(), scara_with_quill()):
+        model, moved = build_model(robot), random_motion(robot.n)
+        rows = model.regressor(moved)
+        for joint, own in enumerate(rows):
+            np.testing.assert_allclose(model.constants[joint] @ own, 1.0, rtol=1e-9)
+    assert "p_o3" not in model.names
+    assert not np.any(build_model(load_robot(), "reduced").constants)
