@@ -62,8 +62,7 @@ class Effect(ABC):
     follows_estimate : bool
         Whether the columns depend on the present estimate, ``scene.value`` or ``scene.armatures``.
     on_links : bool
-        Whether its torque acts on links, as that of a body or a spring does, and not on motors or in what is measured: the
-        gears then transmit it, and effects that follow `Signals.load` know it.
+        Whether its torque acts on links, as a body's or a spring's: gears then transmit it, and effects with `Signals.load` know it.
     of_position : bool
         Whether its torque on links follows from the positions alone, so that how it changes with speeds need not be asked.
     of_load : bool
@@ -391,6 +390,10 @@ class Effect(ABC):
     def alike(self, value: Array, covariance: Array) -> tuple[Array, Array]:
         """Return what of coefficients (k,) all recordings have alike, and its covariance: all, unless each has its own."""
         return value, covariance
+
+    def told_apart_from(self, scene: Scene, member: Member) -> tuple[tuple[Effect, Member], ...]:
+        """Return what is no part of an arm and may look like it in the lower part of the band, beside which it is told there."""
+        return ()
 
     def leaves(self, scene: Scene, member: Member, value: Array) -> tuple[Effect, Member, float] | None:
         """Return what may be left of it in corrected recordings and is no part of an arm, and the band, Hz, that holds that."""
