@@ -197,8 +197,9 @@ def _examined_below(
     # What the filter of so narrow a band does to the motion itself is none of the candidate's.
     beside = [Candidate(*item) for item in candidate.effect.told_apart_from(step.scene, candidate.member)]
     variation = offsets_on(columns.observations, step.offsets)
-    below = replace(step, columns=columns, chosen=(*step.chosen, *beside), variation=variation)
-    (found,) = examine(below.model, below.rows(below.scene, [candidate]), step.criteria)
+    below = replace(step, columns=columns, variation=variation)
+    model = replace(below, chosen=(*step.chosen, *beside)).model if beside else below.model
+    (found,) = examine(model, below.rows(below.scene, [candidate]), step.criteria)
     return found if out is None else replace(found, value=found.value + out.value), max(narrower)
 
 

@@ -210,6 +210,10 @@ class TimeDelay(Effect):
         change = lacking(signals, signals.predicted[rows])
         return [change if member.joint is None else change[0]]
 
+    def of_torque(self, signals: Signals, member: Member, torque: Array) -> Array | None:
+        """Return what that lacks, of all joints: all that is recorded is late, and a ripple turns what it does to the motion round."""
+        return lacking(signals, torque)[:, None] if self.corrects_data(member) else None
+
     def estimate_slopes(self, signals: Signals, member: Member, value: Array) -> EstimateSlopes:
         """Return what each of the base model's columns lacks."""
         found = {joint: predicted_slopes(signals, joint) for joint in self.rows(signals.scene, member)}
