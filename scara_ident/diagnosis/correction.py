@@ -156,8 +156,8 @@ def taken_out(step: SelectionStep, candidate: Candidate) -> tuple[CandidateColum
     """Take an effect out of the data, and again while some of it is left.
 
     A first estimate is one of first order, beside parameters that stand for some of it, and the noise of positions in its column
-    makes it too small, as it does every further one. What of it is left has no part of that noise where it is none, so that the end
-    is not too small; how much of a step the next estimate sees says how far away that is (secant method).
+    makes it too small, as it does every further one. The end is not too small, since what noise makes has nothing in common with its
+    own rate; how much of a step the next estimate sees says how far away the end is (secant method).
 
     Returns
     -------
