@@ -132,6 +132,15 @@ class CandidateColumns:
         self._make(scene, [item for item in candidates if _key(scene, item) not in self._raw], keep=True)
         return [self._raw[_key(scene, item)] for item in candidates]
 
+    def of_torque(self, scene: Scene, candidate: Candidate, torques: Sequence[Array]) -> Rows:
+        """Return what torques of effects on every stretch, shape (n, N), add to a candidate's columns within the bands, see `Effect.of_torque`."""
+        effect, member, found = candidate.effect, candidate.member, list[list[Array]]()
+        for part, torque in zip(self.observations.data.stretches, torques, strict=True):
+            added = effect.of_torque(self._signals_of(scene, part), member, torque) if part.usable else None
+            if added is not None:
+                found.append([part.rows(joint, rows) for joint, rows in enumerate(added)])
+        return {joint: np.concatenate(parts, axis=1) for joint, parts in enumerate(zip(*found, strict=True))}
+
     def slopes(self, scene: Scene, candidate: Candidate) -> Rows:
         """Return a tied candidate's `Effect.slopes` within the bands, shape (p + 1 + s, N) on the N rows of each joint that has some."""
         effect, member = candidate.effect, candidate.member

@@ -9,11 +9,11 @@ import numpy as np
 
 from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.candidates import Candidate
-from scara_ident.diagnosis.correction import still_there, taken_out, told_beside
+from scara_ident.diagnosis.correction import LEAST_SEEN, still_there, taken_out, told_beside
 from scara_ident.diagnosis.criteria import SelectionCriteria
 from scara_ident.diagnosis.effect_parameters import parameters_beside, told_size
 from scara_ident.diagnosis.linearised import freed_model
-from scara_ident.diagnosis.noise_check import noise_objection
+from scara_ident.diagnosis.noise_check import noise_objection, noise_of_column
 from scara_ident.diagnosis.nonlinear_fit import tune
 from scara_ident.diagnosis.remainder_check import remainder_objection
 from scara_ident.diagnosis.same_errors import same
@@ -322,14 +322,22 @@ def _in_place_of_the_last(step: SelectionStep, points: Sequence[Decision]) -> li
 
 
 def _left_again(step: SelectionStep, decision: Decision) -> str | None:
-    """Say so where much of a correction is left once it was made: of a delay that is there it is a term of third order."""
+    """Say so where much of a correction is left once it was made: of one that is there it is a term of third order.
+
+    The noise of positions in its column makes the first estimate too small by its share of the column's square, and what is left
+    as much larger (Fuller, Measurement Error Models, 1987).
+    """
     candidate, first = decision.candidate, decision.examination.value
     if not candidate.corrects_data:
         return None
     if candidate.effect.of_each_recording:
-        first = still_there(told_beside(step, candidate), candidate, np.zeros_like(first))
+        first, hidden = still_there(told_beside(step, candidate), candidate, np.zeros_like(first)), 0.0
+    else:
+        hidden = min(max(noise_of_column(step, decision), 0.0), 1.0 - LEAST_SEEN)
     whole = taken_out(step, candidate)[1].value
-    if np.max(np.abs(whole - first)) <= step.criteria.lower_change * np.max(np.abs(first)):
+    # Between what the first says and what it would be without that noise, which is known roughly, all is as good.
+    expected = np.clip(whole, *np.sort([first, first / (1.0 - hidden)], axis=0))
+    if np.max(np.abs(whole - expected)) <= step.criteria.lower_change * np.max(np.abs(expected)):
         return None
     name, unit = candidate.effect.coefficients[0].name, candidate.effect.coefficients[0].unit
     place = int(np.argmax(np.abs(whole - first)))

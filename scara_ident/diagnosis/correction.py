@@ -19,6 +19,9 @@ from scara_ident.motion.prepared import PreparedData
 
 # Each leaves a tenth or less of what the last one left.
 MOST_CORRECTIONS = 6
+# Of a column that is three quarters noise an estimate sees a quarter of what is there. What a step is scaled up by ends here, or one
+# that the data hardly answer would go anywhere.
+LEAST_SEEN = 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,7 +155,9 @@ def still_there(step: SelectionStep, candidate: Candidate, whole: Array) -> Arra
 def taken_out(step: SelectionStep, candidate: Candidate) -> tuple[CandidateColumns, Correction]:
     """Take an effect out of the data, and again while some of it is left.
 
-    A first estimate is one of first order, beside parameters that stand for some of it.
+    A first estimate is one of first order, beside parameters that stand for some of it, and the noise of positions in its column
+    makes it too small, as it does every further one. The end is not too small, since what noise makes has nothing in common with its
+    own rate; how much of a step the next estimate sees says how far away the end is (secant method).
 
     Returns
     -------
@@ -164,14 +169,18 @@ def taken_out(step: SelectionStep, candidate: Candidate) -> tuple[CandidateColum
     names = tuple(item.name for item in step.observations.data.recordings)
     whole, last, whole_band = np.zeros(len(candidate.effect.columns(step.scene, candidate.member))), np.inf, step
     step = told_beside(step, candidate)
+    seen, before, moved = 1.0, whole, whole
     for _ in range(MOST_CORRECTIONS):
         value = still_there(step, candidate, whole)
         size = float(np.linalg.norm(value))
-        if candidate.effect.settled(value) or size >= last:
+        if np.any(moved):
+            seen = max(LEAST_SEEN, float((before - value) @ moved) / float(moved @ moved))
+        if candidate.effect.settled(value / seen) or size >= last:
             break
-        whole, last = whole + value, size
+        before, moved, last = value, value / seen, size
+        whole = whole + moved
         observations = step.observations.with_torque(
-            corrected(step.observations.data, Correction(candidate, value, names))
+            corrected(step.observations.data, Correction(candidate, moved, names))
         )
         step = replace(step, columns=step.columns.beside(observations))
         estimate, weights = value_and_weights(observed(step), step.offsets)

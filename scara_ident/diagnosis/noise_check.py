@@ -12,6 +12,7 @@ from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.candidate_tests import Examination, coefficients, examine
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.cluster_test import significance
+from scara_ident.diagnosis.correction import Correction, corrected, taken_out
 from scara_ident.diagnosis.selection_step import SelectionStep
 from scara_ident.effects import Scene
 from scara_ident.errors import RecordingError
@@ -97,7 +98,12 @@ def _gone_further_down(step: SelectionStep, decision: Decision) -> str | None:
     candidate, criteria, whole = decision.candidate, step.criteria, decision.examination
     if not candidate.effect.same_at_all_frequencies:
         return None
-    below = _examined_below(step, candidate, criteria.lower_band)
+    out = None
+    if candidate.corrects_data and not candidate.effect.of_each_recording:
+        # The noise of positions in its column makes a first estimate too small, where there is little of it further down.
+        out = taken_out(step, candidate)[1]
+        whole = _grown_to(whole, out.value)
+    below = _examined_below(step, candidate, criteria.lower_band, out)
     if below is None:
         return None
     found, band = below
@@ -162,18 +168,39 @@ def noise_of_column(step: SelectionStep, decision: Decision) -> float:
     return float(found.value @ products @ found.value) / whole - 1.0 if whole > 0.0 else 0.0
 
 
-def _examined_below(step: SelectionStep, candidate: Candidate, share: float) -> tuple[Examination, float] | None:
+def _grown_to(found: Examination, value: Array) -> Examination:
+    """Return what is said of coefficients that are as unsure as they were for their size, and larger or smaller."""
+    size = float(np.linalg.norm(found.value))
+    grown = float(np.linalg.norm(value)) / size if size > 0.0 else 1.0
+    return replace(found, value=value, covariance=grown**2 * found.covariance)
+
+
+def _examined_below(
+    step: SelectionStep, candidate: Candidate, share: float, out: Correction | None = None
+) -> tuple[Examination, float] | None:
     """Return what is said of a candidate in the lower part of the band, this share of it, and where that ends, Hz.
 
     None where a recording is too short for that part.
+
+    Parameters
+    ----------
+    out : Correction, optional
+        Of the candidate, taken out of the data before what is left of it is looked for.
     """
     narrower = tuple(share * (band or step.scene.band) for band in step.observations.data.bands)
     try:
         columns = step.columns.at(narrower)
     except RecordingError:
         return None
-    below = replace(step, columns=columns, variation=offsets_on(columns.observations, step.offsets))
-    return examine(below.model, below.rows(below.scene, [candidate]), step.criteria)[0], max(narrower)
+    if out is not None:
+        columns = columns.beside(columns.observations.with_torque(corrected(columns.observations.data, out)))
+    # What the filter of so narrow a band does to the motion itself is none of the candidate's.
+    beside = [Candidate(*item) for item in candidate.effect.told_apart_from(step.scene, candidate.member)]
+    variation = offsets_on(columns.observations, step.offsets)
+    below = replace(step, columns=columns, variation=variation)
+    model = replace(below, chosen=(*step.chosen, *beside)).model if beside else below.model
+    (found,) = examine(model, below.rows(below.scene, [candidate]), step.criteria)
+    return found if out is None else replace(found, value=found.value + out.value), max(narrower)
 
 
 def _differing(found: Examination, whole: Examination) -> float:

@@ -120,6 +120,15 @@ class SelectionStep:
     def rows(self, scene: Scene, candidates: Sequence[Candidate]) -> list[Rows]:
         """Return the columns of candidates as they are tried beside the model."""
         found = self.columns.rows(scene, candidates)
+        whole = [place for place, item in enumerate(candidates) if item.corrects_data and self.chosen]
+        if whole:
+            # What is taken out of the data is taken out of what effects in the model do, too.
+            value, start = self.model.root @ self.model.projected, self.observations.parameters
+            value = np.concatenate([np.zeros(start), value[start:]])
+            torques = self.columns.predicted(self.scene, self.chosen, value)
+            for place in whole:
+                added = self.columns.of_torque(scene, candidates[place], torques)
+                found[place] = {j: rows + added[j] if j in added else rows for j, rows in found[place].items()}
         if self.variation is None:
             return found
         return [{joint: self.variation.whitened(joint, own) for joint, own in rows.items()} for rows in found]
@@ -130,6 +139,7 @@ class SelectionStep:
         loaded = [
             (item.effect.of_load and item.effect.geared_joint(item.member) in acting)
             or (item.effect.together and bool(self.scene.together))
+            or (item.corrects_data and bool(self.chosen))
             for item in candidates
         ]
         found: list[Rows | None] = [None] * len(candidates)

@@ -62,13 +62,11 @@ class Effect(ABC):
     follows_estimate : bool
         Whether the columns depend on the present estimate, ``scene.value`` or ``scene.armatures``.
     on_links : bool
-        Whether its torque acts on links, as that of a body or a spring does, and not on motors or in what is measured: the
-        gears then transmit it, and effects that follow `Signals.load` know it.
+        Whether its torque acts on links, as a body's or a spring's: gears then transmit it, and effects with `Signals.load` know it.
     of_position : bool
         Whether its torque on links follows from the positions alone, so that how it changes with speeds need not be asked.
     of_load : bool
-        Whether the columns are a function of the load that a gear transmits: with an effect that acts on links they are others,
-        and are made again to be tried beside it.
+        Whether the columns are a function of the load that a gear transmits, and are made again beside an effect that acts on links.
     fitted_first : bool
         Whether it is judged at the estimate fitted with it only: its columns at the estimate without it are poor ones.
     together : bool
@@ -266,10 +264,7 @@ class Effect(ABC):
         return self.summary.format(**self.words(scene, member))
 
     def or_else(self, scene: Scene, member: Member, value: Array) -> str:
-        """Say what else an effect of these coefficients may be, by the parameters of the model with it; "" for nothing.
-
-        It follows the description.
-        """
+        """Say after the description what else an effect of these coefficients may be, by the model's parameters with it; or ""."""
         return ""
 
     def gap(self, scene: Scene, member: Member) -> tuple[float, ...]:
@@ -348,10 +343,7 @@ class Effect(ABC):
         return slopes_by_differences(self, signals, member, value)
 
     def instead(self, scene: Scene, member: Member) -> tuple[tuple[Member, Member], ...]:
-        """Return two members of which one alone may have taken up what both do, to begin a fit of both, the likeliest first.
-
-        The first of them is of the member's joint.
-        """
+        """Return pairs, the likeliest first, of which one alone, of the member's joint and first, may have taken up what both do."""
         return ()
 
     def elsewhere(self, scene: Scene, member: Member) -> tuple[Member, ...]:
@@ -391,6 +383,14 @@ class Effect(ABC):
     def alike(self, value: Array, covariance: Array) -> tuple[Array, Array]:
         """Return what of coefficients (k,) all recordings have alike, and its covariance: all, unless each has its own."""
         return value, covariance
+
+    def of_torque(self, signals: Signals, member: Member, torque: Array) -> Array | None:
+        """Return what the torque (n, N) of effects in the model adds to the columns, shape (n, k, N); None where that is nothing."""
+        return None
+
+    def told_apart_from(self, scene: Scene, member: Member) -> tuple[tuple[Effect, Member], ...]:
+        """Return what is no part of an arm and may look like it in the lower part of the band, beside which it is told there."""
+        return ()
 
     def leaves(self, scene: Scene, member: Member, value: Array) -> tuple[Effect, Member, float] | None:
         """Return what may be left of it in corrected recordings and is no part of an arm, and the band, Hz, that holds that."""

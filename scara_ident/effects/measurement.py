@@ -228,6 +228,10 @@ class TimeDelay(Effect):
         change = lacking(signals, signals.predicted[rows])
         return [change if member.joint is None else change[0]]
 
+    def of_torque(self, signals: Signals, member: Member, torque: Array) -> Array | None:
+        """Return what that lacks, of all joints: all that is recorded is late, and a ripple turns what it does to the motion round."""
+        return lacking(signals, torque)[:, None] if self.corrects_data(member) else None
+
     def estimate_slopes(self, signals: Signals, member: Member, value: Array) -> EstimateSlopes:
         """Return what each of the base model's columns lacks."""
         found = {joint: predicted_slopes(signals, joint) for joint in self.rows(signals.scene, member)}
@@ -262,6 +266,10 @@ class TimeDelay(Effect):
             f"effort and position are {float(value[0]) * 1e3:+.2g} ms apart, less than one sample, as when a sample is "
             "held to the next"
         )
+
+    def told_apart_from(self, scene: Scene, member: Member) -> tuple[tuple[Effect, Member], ...]:
+        """Return when the friction of each of its joints turns."""
+        return tuple((LateTurn(), Member(joint)) for joint in self.rows(scene, member))
 
     def leaves(self, scene: Scene, member: Member, value: Array) -> tuple[Effect, Member, float] | None:
         """Return the rest of a filter of the positions where these are the later ones by more than a sample."""
@@ -300,6 +308,26 @@ class PositionFilter(Effect):
         cut = band if band < HIGHEST_CUT * rate else None
         _, first, second = differentiate(signals.rigid, rate, cut)
         return [first, second, *differentiate(second, rate, cut)[1:]]
+
+
+class LateTurn(Effect):
+    """Coulomb friction of a joint that jumps later than the filtered velocity turns.
+
+    It is no part of an arm and in no catalogue. Acceleration changes where friction jumps, and a narrow filter, which rounds that off,
+    moves the time of the turn, by 1.7 ms in a band of 7 Hz; friction that builds up over a distance is late too. In so narrow a band the
+    few rows where friction jumps have most of what the torque's rate has beyond the model, and would tell a delay that no other row has.
+    """
+
+    name = "late_turn"
+    summary = "friction that jumps later than the velocity turns"
+    coefficients = (
+        Coefficient("step_delay", "{torque} s", "Coulomb friction of {joint} times by how much it is late"),
+    )
+    not_simulated = "it is no part of an arm"
+
+    def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
+        """Return what one unit of Coulomb friction lacks for each second that it is late."""
+        return lacking(signals, signals.sign[member.place : member.place + 1])
 
 
 def lacking(signals: Signals, torque: Array) -> Array:

@@ -90,6 +90,13 @@ class DelayOfEachRecording(TimeDelay):
         apart = float(np.var(value, ddof=1)) if count > 1 else 0.0
         return np.mean(value, keepdims=True), np.full((1, 1), np.mean(covariance) + apart / count)
 
+    def of_torque(self, signals: Signals, member: Member, torque: Array) -> None:
+        """Return nothing: what else is fitted may jump where friction does."""
+
+    def told_apart_from(self, scene: Scene, member: Member) -> tuple[()]:
+        """Return nothing: when friction turns is in no column of it."""
+        return ()
+
     def leaves(self, scene: Scene, member: Member, value: Array) -> None:
         """Return nothing: a filter of the positions is the same in all recordings."""
 

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from scara_ident.diagnosis import correction
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.diagnosis.correction import Correction, corrected, drawn_together, taken_out
 from scara_ident.effects import Member
-from scara_ident.effects.measurement import TimeDelay, shifted
+from scara_ident.effects.measurement import DELAY_STEP, TimeDelay, shifted
 from scara_ident.effects.recording_delays import DelayOfEachRecording
 from scara_ident.estimation import wls
 from scara_ident.estimation.run_offsets import rms_of
@@ -62,6 +63,29 @@ def test_a_long_delay_is_taken_out_until_nothing_is_left():
     clean = step_beside(exact_runs()[:2]).observations
     left, without = (rms_of(wls(item).value, item) for item in (columns.observations, clean))
     assert left == pytest.approx(without, rel=0.02)
+
+
+def test_what_noise_of_positions_hides_of_a_delay_is_taken_out_too(monkeypatch: pytest.MonkeyPatch):
+    """Each estimate sees half of what is left: six steps of that size end a fiftieth short."""
+    rng, asked = np.random.default_rng(5), []
+    late = [shifted(run, -0.008) for run in exact_runs()]
+    step = step_beside(
+        [replace(run, position=run.position + 7e-5 * rng.standard_normal(run.position.shape)) for run in late]
+    )
+    candidate, ask = Candidate(TimeDelay(), Member(None)), correction.still_there
+
+    def count(*of) -> np.ndarray:
+        asked.append(ask(*of))
+        return asked[-1]
+
+    monkeypatch.setattr(correction, "still_there", count)
+    _, found = taken_out(step, candidate)
+    assert asked[0][0] < 0.5 * 0.008
+    # As sure as twice the first estimate.
+    (first,) = step.judge([candidate])
+    std = found.value[0] / first.examination.value[0] * float(np.sqrt(first.examination.covariance[0, 0]))
+    assert found.value[0] == pytest.approx(0.008, abs=2.0 * std)
+    assert abs(asked[-1][0]) < DELAY_STEP and len(asked) <= 5
 
 
 def test_each_recording_is_corrected_by_its_own_and_what_all_have_alike_counts_for_each():
