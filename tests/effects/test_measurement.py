@@ -83,25 +83,21 @@ def test_the_ratio_is_to_the_first_joint_with_what_both_scales_are_uncertain_by(
     assert (alone.value, alone.std) == (pytest.approx(0.8), pytest.approx(2e-3))
 
 
-@pytest.mark.parametrize("cubic", [0.002, -0.002])
-def test_the_cubic_is_recovered(cubic: float):
-    # Up to 10 % at the largest torques.
-    data = recordings(lambda u, t: np.array([u[0] + cubic * u[0] ** 3, u[1]]))
-    effect, member = TorqueSensorNonlinearity(), Member(0)
+# Up to 10 % at the largest torques.
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize(
+    ("effect", "name", "size", "unit"),
+    [(TorqueSensorNonlinearity(), "cubic", 0.002, "1/(N m)^2"), (BentTorqueSensor(), "square", 0.02, "1/(N m)")],
+)
+def test_a_channel_that_is_not_straight_is_recovered(
+    effect: TorqueSensorNonlinearity, name: str, size: float, unit: str, sign: float
+):
+    data = recordings(lambda u, t: np.array([u[0] + sign * size * u[0] ** effect.power, u[1]]))
+    member = Member(0)
     scene, value, covariance = fit(build_model(load_robot()), data, effect, member, rounds=3)
-    found = effect.parameters(scene, member, value, covariance)["cubic"]
-    assert found.value == pytest.approx(cubic, rel=0.02)
-    assert found.unit == "1/(N m)^2"
-
-
-@pytest.mark.parametrize("square", [0.02, -0.02])
-def test_the_square_is_recovered(square: float):
-    data = recordings(lambda u, t: np.array([u[0] + square * u[0] ** 2, u[1]]))
-    effect, member = BentTorqueSensor(), Member(0)
-    scene, value, covariance = fit(build_model(load_robot()), data, effect, member, rounds=3)
-    found = effect.parameters(scene, member, value, covariance)["square"]
-    assert found.value == pytest.approx(square, rel=0.02)
-    assert found.unit == "1/(N m)"
+    found = effect.parameters(scene, member, value, covariance)[name]
+    assert found.value == pytest.approx(sign * size, rel=0.02)
+    assert found.unit == unit
 
 
 def test_the_ratio_is_recovered_from_what_the_joints_share():
