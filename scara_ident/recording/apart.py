@@ -13,7 +13,7 @@ from typing import TypeAlias, TypeVar
 from scara_ident.errors import ProcessEnded, RecordingError
 from scara_ident.processes import each_beside
 from scara_ident.recording.paths import recording_paths
-from scara_ident.recording.recording import Recording, read_recording
+from scara_ident.recording.recording import Recording, read_recording, told_apart
 from scara_ident.robot.robot import Robot
 
 T = TypeVar("T")
@@ -77,7 +77,7 @@ def _usable(each: Sequence[Callable[[], Recording]]) -> Usable:
             notes.append(f"{error}; left out")
     if errors and not found:
         raise errors[0]
-    return tuple(found), notes
+    return told_apart(found), notes
 
 
 @contextmanager

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import glob
+import os
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -20,19 +21,44 @@ def recording_name(path: Path) -> str:
 def recording_paths(words: Sequence[Path | str]) -> tuple[Path, ...]:
     """List the files that words on a command line stand for (see `read_recordings`)."""
     found: dict[Path, Path] = {}
-    stems: dict[str, Path] = {}
+    stems: dict[tuple[Path, str], Path] = {}
     for word in words:
         for path in _paths(str(word)):
             real = real_path(path)
             if real in found:
                 continue
-            name = recording_name(path)
-            if name in stems:
+            named = real.parent, recording_name(path)
+            if named in stems:
                 raise RecordingError(
-                    f"{stems[name]} and {path}: two recordings named {name!r}; rename one, results are listed by name"
+                    f"{stems[named]} and {path}: two recordings named {named[1]!r}; rename one, results are listed by name"
                 )
-            found[real] = stems[name] = path
+            found[real] = stems[named] = path
     return tuple(found.values())
+
+
+def distinct_names(paths: Sequence[Path]) -> tuple[str, ...]:
+    """Return a name for each recording: its own, led by as many of its folders as tell it from others of that name.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> distinct_names([Path("monday/run_1.csv"), Path("tuesday/run_1.csv"), Path("tuesday/run_2.csv")])
+    ('monday/run_1', 'tuesday/run_1', 'run_2')
+    """
+    named = [(*Path(os.path.abspath(path)).parts[1:-1], recording_name(path)) for path in paths]
+    alike: dict[str, list[tuple[str, ...]]] = {}
+    for name in named:
+        alike.setdefault(name[-1], []).append(name)
+    return tuple("/".join(name[-_told_by(name, alike[name[-1]]) :]) for name in named)
+
+
+def _told_by(name: tuple[str, ...], alike: Sequence[tuple[str, ...]]) -> int:
+    """Return how many of the last words of a name no other of these ends in."""
+    others = [other for other in alike if other != name]
+    count = 1
+    while any(other[-count:] == name[-count:] for other in others):
+        count += 1
+    return count
 
 
 def _paths(word: str) -> list[Path]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
@@ -22,7 +23,7 @@ from scara_ident.recording.files.parquet_csv import write_columns
 from scara_ident.recording.files.parquet_rows import read_rows
 from scara_ident.recording.long_file import LongFile, long_file
 from scara_ident.recording.one_clock import on_one_clock
-from scara_ident.recording.paths import recording_name, recording_paths
+from scara_ident.recording.paths import distinct_names, recording_name, recording_paths
 from scara_ident.recording.wanted import lacking_numbers, optional_channels, refuse_missing
 from scara_ident.robot.signal_map import SIGNALS, Channel, Channels, contract_channels
 
@@ -338,14 +339,14 @@ def read_recordings(words: Sequence[Path | str], robot: Robot, *, need_effort: b
     Returns
     -------
     tuple of Recording
-        In order of appearance, each file once.
+        In order of appearance, each file once; see `told_apart`.
 
     Raises
     ------
     UsageError
         A word that is no file, folder or matching glob.
     RecordingError
-        A folder or glob without recordings, two files of one stem, or a recording that cannot be used.
+        A folder or glob without recordings, two files of one stem in one folder, or a recording that cannot be used.
 
     Examples
     --------
@@ -356,7 +357,18 @@ def read_recordings(words: Sequence[Path | str], robot: Robot, *, need_effort: b
     >>> read_recordings(["OJK_*.parquet"], robot)
     (Recording(OJK_1: 2 joints, 5001 samples at 250 Hz),)
     """
-    return tuple(read_recording(path, robot, need_effort=need_effort) for path in recording_paths(words))
+    return told_apart([read_recording(path, robot, need_effort=need_effort) for path in recording_paths(words)])
+
+
+def told_apart(recordings: Sequence[Recording]) -> tuple[Recording, ...]:
+    """Return recordings of which those of one name, out of several folders, are named with their folder: results are by name."""
+    called = Counter(recording.name for recording in recordings)
+    of_files = {recording.path for recording in recordings if recording.path is not None and called[recording.name] > 1}
+    names = dict(zip(of_files, distinct_names(list(of_files)), strict=True))
+    return tuple(
+        replace(recording, name=names[recording.path]) if recording.path in names else recording
+        for recording in recordings
+    )
 
 
 def write_recording(recording: Recording, path: Path | str, *, effort_gain: Array | None = None) -> None:

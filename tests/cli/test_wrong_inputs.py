@@ -46,7 +46,6 @@ RECORDINGS = [
     ("backwards_1.parquet", 1, ("backwards_1.parquet: time never advances", "must be in seconds and grow")),
     ("leap_1.parquet", 1, ("leap_1.parquet: time runs backwards at row 601", "sort the rows by time")),
     ("frozen_1.parquet", 1, ("frozen_1.parquet: time never advances", "must be in seconds and grow")),
-    ("day1 day2", 1, ("two recordings named 'run_1'", "day1", "day2", "rename one")),
 ]
 ROBOTS = [
     ("no.yaml", 2, ("no.yaml: no such robot description",)),

@@ -14,7 +14,8 @@ from scara_ident.errors import ArgumentError, RecordingError
 from scara_ident.identification.arguments import model_of, recordings_of
 from scara_ident.identification.compare import compare
 from scara_ident.identification.identify import identify
-from scara_ident.recording.recording import Recording, read_recording
+from scara_ident.recording.apart import read_usable
+from scara_ident.recording.recording import Recording, read_recording, read_recordings
 from scara_ident.robot.robot import Robot, load_robot
 from tests.made_recordings import columns, save
 
@@ -35,6 +36,17 @@ def test_recordings_files_and_folders_are_taken(robot: Robot, run: Recording, tm
     for given in (run, [run], run.path, str(tmp_path), [tmp_path / "run_1.parquet"], (item for item in [run])):
         assert [item.name for item in recordings_of(given, robot)] == ["run_1"]
     assert recordings_of((), robot) == ()
+
+
+def test_recordings_of_one_name_are_named_with_their_folders(robot: Robot, tmp_path: Path):
+    for folder in ("monday", "tuesday"):
+        (tmp_path / folder).mkdir()
+        save(tmp_path / folder / "run_1.parquet", MADE)
+    save(tmp_path / "tuesday" / "run_2.parquet", MADE)
+    given = [tmp_path / "monday", tmp_path / "tuesday"]
+    expected = [("monday/run_1", "run", 1), ("tuesday/run_1", "run", 1), ("run_2", "run", 2)]
+    for found in (recordings_of(given, robot), read_recordings(given, robot), read_usable(given, robot)[0]):
+        assert [(item.name, item.trajectory, item.repetition) for item in found] == expected
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from scara_ident.errors import RecordingError, UsageError
-from scara_ident.recording.paths import recording_paths
+from scara_ident.recording.paths import distinct_names, recording_paths
 from scara_ident.recording.recording import read_recording, read_recordings
 from tests.made_recordings import columns, save
 from tests.recording.made import csv_lines, write_text
@@ -68,11 +68,23 @@ def test_words_that_name_nothing_are_bad_usage_and_places_without_recordings_an_
         recording_paths([str(tmp_path / "*")])
 
 
-def test_two_files_of_one_name_are_refused_by_both_names(tmp_path):
-    for name in ("a", "b"):
-        (tmp_path / name).mkdir()
-        save(tmp_path / name / "OJD_1.parquet", columns(60))
+def test_two_files_of_one_name_in_a_folder_are_refused_by_both_names(tmp_path):
+    save(tmp_path / "OJD_1.parquet", columns(60))
+    save(tmp_path / "OJD_1.csv", columns(60))
     with pytest.raises(RecordingError) as caught:
-        recording_paths([tmp_path / "a", tmp_path / "b"])
-    assert str(tmp_path / "a" / "OJD_1.parquet") in str(caught.value)
-    assert str(tmp_path / "b" / "OJD_1.parquet") in str(caught.value)
+        recording_paths([tmp_path])
+    assert str(tmp_path / "OJD_1.parquet") in str(caught.value)
+    assert str(tmp_path / "OJD_1.csv") in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("paths", "names"),
+    [
+        (["a/OJD_1.csv", "b/OJD_2.csv"], ("OJD_1", "OJD_2")),
+        (["a/OJD_1.csv", "b/OJD_1.csv", "b/OJD_2.csv"], ("a/OJD_1", "b/OJD_1", "OJD_2")),
+        (["a/x/OJD_1.csv", "b/x/OJD_1.csv", "b/y/OJD_1.csv"], ("a/x/OJD_1", "b/x/OJD_1", "y/OJD_1")),
+        (["/OJD_1.csv", "/x/OJD_1.csv", "/y/x/OJD_1.csv"], ("OJD_1", "x/OJD_1", "y/x/OJD_1")),
+    ],
+)
+def test_recordings_of_one_name_are_told_by_their_folders(paths, names):
+    assert distinct_names([Path(path) for path in paths]) == names
