@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.candidates import Candidate
 from scara_ident.effects import Scene
+from scara_ident.effects.links import tool_of
 from scara_ident.effects.parameters import Parameter
 from scara_ident.model.model import TorqueModel
 from scara_ident.model.terms.friction import Friction, Offset
@@ -22,6 +23,9 @@ RUN_KINDS = ("coulomb", "speed", "torque_scale", "offset", "delay")
 TOLD_RUNS = np.array([[1, 0, 0, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]], dtype=float)
 # Friction of these powers of speed is also looked at alone; of higher ones a recording says little.
 ALONE = 2
+# What is left of a change of masses beside a body on the last link, as a share of it, up to which it is that body: no model is exact.
+# A mass of which as much is told by no row is not told.
+LEFT_OF_PAYLOAD, UNTOLD = 0.1, 1e-6
 # A parameter below so many standard deviations is no size that a share can be taken of.
 TOLD_STDS = 5.0
 
@@ -157,8 +161,12 @@ def run_directions(
 def sizes_in_words(cause: Cause, scene: Scene, size: Array, covariance: Array) -> dict[str, Parameter]:
     """Return by name how large a change is, with what it is uncertain by.
 
-    Of a watched effect these are its physical parameters, but for phases.
+    Of a watched effect these are its physical parameters, but for phases; of masses and inertias it is the mass of a payload,
+    if a body on the last link makes that change and its mass is told.
     """
+    if cause.effect == "inertia":
+        mass = _payload(scene, size, covariance)
+        return {} if mass is None else {"mass": mass}
     if cause.candidate is None:
         names = ("",) if cause.sizes == 1 else tuple(f"size{k + 1}" for k in range(cause.sizes))
         std = np.sqrt(np.clip(np.diag(covariance), 0.0, None))
@@ -168,6 +176,26 @@ def sizes_in_words(cause: Cause, scene: Scene, size: Array, covariance: Array) -
         }
     told = cause.candidate.effect.parameters(scene, cause.candidate.member, size, covariance)
     return {name: item for name, item in told.items() if np.isfinite(item.std) and name != "phase"}
+
+
+def _payload(scene: Scene, size: Array, covariance: Array) -> Parameter | None:
+    """Return the mass of a body on the last link that changes the base parameters by this; None where none does, or it is not told."""
+    term, last = scene.model.rigid_body, 10 * tool_of(scene.robot).joint
+    columns = term.base.grouping[term.kept, last : last + 10]
+    variances, axes = np.linalg.eigh(covariance)
+    told = variances > np.finfo(float).eps * len(variances) * max(float(variances[-1]), 0.0)
+    white = (axes[:, told] / np.sqrt(variances[told])).T
+    rows, change = white @ columns, white @ size
+    units = np.linalg.norm(rows, axis=0)
+    units[units == 0.0] = 1.0
+    inverse = np.linalg.pinv(rows / units, rcond=UNTOLD) / units[:, None]
+    mass, left = inverse[0], change - rows @ (inverse @ change)
+    # What a mass of 1 kg is taken for, in parts of each of the body's ten parameters.
+    taken = (mass @ rows) * units[0] / units
+    is_body = np.linalg.norm(left) <= LEFT_OF_PAYLOAD * np.linalg.norm(change)
+    if not is_body or np.linalg.norm(taken - np.eye(len(taken))[0]) > UNTOLD:
+        return None
+    return Parameter(float(mass @ change), float(np.linalg.norm(mass)), "kg")
 
 
 def _kinds(model: TorqueModel) -> NDArray[np.str_]:

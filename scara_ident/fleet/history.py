@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scara_ident.arrays import NORMAL_MEDIAN, Array
 from scara_ident.effects import Scene
@@ -41,12 +42,15 @@ class DateRows:
         Of each cause.
     runs : ndarray, shape (R, 5 n)
         What one unit of each of `RUN_KINDS` does, joint by joint.
+    starts : ndarray of int, shape (n,)
+        The first row of each joint.
     """
 
     columns: Array
     torque: Array
     directions: tuple[Array, ...]
     runs: Array
+    starts: NDArray[np.intp]
 
     def whitened(self, root: Array) -> DateRows:
         """Return the rows with what differs from run to run weighed as the noise it is, of covariance ``root @ root.T``."""
@@ -62,7 +66,7 @@ class DateRows:
             return np.asarray(signal - (along * loss) @ (along.T @ signal))
 
         each = tuple(white(item) for item in self.directions)
-        return DateRows(white(self.columns), white(self.torque), each, white(self.runs))
+        return DateRows(white(self.columns), white(self.torque), each, white(self.runs), self.starts)
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,7 +160,8 @@ class History:
             for found, cause in zip(directions, self.causes, strict=True):
                 found.append(half[:, :-1] @ cause.weights[j])
         stacked = tuple(np.concatenate(found) for found in directions)
-        return DateRows(np.concatenate(columns), np.concatenate(torque), stacked, np.concatenate(along))
+        starts = np.cumsum([0, *(len(own) for own in torque[:-1])])
+        return DateRows(np.concatenate(columns), np.concatenate(torque), stacked, np.concatenate(along), starts)
 
 
 def common_removed(rows: Sequence[DateRows]) -> tuple[list[Array], list[Array]]:

@@ -13,7 +13,6 @@ from scara_ident.arrays import Array
 from scara_ident.estimation.information import triangular
 from scara_ident.fleet.causes import TOLD_RUNS, Cause, sizes_in_words
 from scara_ident.fleet.changes import Change
-from scara_ident.fleet.folder import Fault
 from scara_ident.fleet.history import History, noise_of, pseudo_inverses, scatter
 from scara_ident.fleet.visit import Visit
 
@@ -25,7 +24,8 @@ if TYPE_CHECKING:
 # An effect of which the model leaves less than this share of its columns is not told from it.
 SEEN_SHARE = 1e-5
 COLUMNS = (
-    "arm", "date", "quantity", "joint", "unit", "parameter", "std", "effect", "since", "error", "verdict", "fault",
+    "arm", "date", "quantity", "joint", "unit", "parameter", "std", "effect", "since", "error", "verdict", "changes",
+    "fault",
 )  # fmt: skip
 
 
@@ -108,6 +108,8 @@ def fleet_table(fleet: Fleet) -> pl.DataFrame:
 
     rows: list[Mapping[str, Any]] = []
     for report in fleet.arms:
+        of_arm = {"arm": report.arm, "verdict": report.verdict, "changes": "; ".join(report.sentences) or None}
+        nothing = dict.fromkeys(COLUMNS) | of_arm
         dates = fleet.quantities.get(report.arm, ())
         for k, each in enumerate(dates):
             visit, day = report.known.visits[k], report.known.dates[k]
@@ -117,8 +119,8 @@ def fleet_table(fleet: Fleet) -> pl.DataFrame:
                 error = worst if joint is None else float(visit.error[joint])
                 change = _change_of(item, day, report.changes)
                 rows.append(
-                    {
-                        "arm": report.arm,
+                    nothing
+                    | {
                         "date": day,
                         "quantity": item.name,
                         "joint": item.joint,
@@ -128,18 +130,11 @@ def fleet_table(fleet: Fleet) -> pl.DataFrame:
                         "effect": None if change is None or change.cause is None else change.cause.effect,
                         "since": None if change is None else change.since,
                         "error": _finite(error),
-                        "verdict": report.verdict,
-                        "fault": None,
                     }
                 )
-        rows += [_fault_row(fault, report.verdict) for fault in report.faults]
+        rows += [nothing | {"date": fault.date, "fault": str(fault)} for fault in report.faults]
     kinds = {name: pl.Float64 if name in ("parameter", "std", "error") else pl.String for name in COLUMNS}
     return pl.DataFrame(rows, schema=kinds).with_columns(pl.col("date", "since").str.to_date())
-
-
-def _fault_row(fault: Fault, verdict: str) -> dict[str, Any]:
-    nothing = dict.fromkeys(COLUMNS)
-    return {**nothing, "arm": fault.arm, "date": fault.date, "verdict": verdict, "fault": str(fault)}
 
 
 def _change_of(item: Quantity, day: str, changes: Sequence[Change]) -> Change | None:

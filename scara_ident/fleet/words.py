@@ -9,7 +9,7 @@ import numpy as np
 
 from scara_ident.effects import Scene
 from scara_ident.effects.parameters import Parameter
-from scara_ident.fleet.causes import sizes_in_words
+from scara_ident.fleet.causes import Cause, sizes_in_words
 from scara_ident.fleet.changes import Change
 
 # Of several sizes those are named that are told from zero by so many standard deviations.
@@ -35,7 +35,7 @@ def _sentence(changes: Sequence[Change], scene: Scene) -> str:
     cause = change.cause
     words = cause.words if cause.joint is None or cause.joint in cause.words else f"{cause.words} on {cause.joint}"
     each = ",".join(
-        f"{_size(item, scene, again=k > 0)} {'gradually since' if item.gradual else 'since'} {day(item.since)}"
+        f"{_size(item, cause, scene, again=k > 0)} {'gradually since' if item.gradual else 'since'} {day(item.since)}"
         for k, item in enumerate(changes)
     )
     alike = ", ".join(dict.fromkeys(other.words for item in changes for other in item.or_else[:3]))
@@ -43,14 +43,16 @@ def _sentence(changes: Sequence[Change], scene: Scene) -> str:
     return f"{words[0].upper()}{words[1:]}{':' if cause.candidate else ''}{each}{other}"
 
 
-def _size(change: Change, scene: Scene, *, again: bool = False) -> str:
+def _size(change: Change, cause: Cause, scene: Scene, *, again: bool = False) -> str:
     """Return the size of a change in words; a single one that is named before needs no name again."""
-    cause = change.cause
-    if cause is None or cause.effect == "inertia":
-        # A sum of many parameters has no size of its own.
-        return f" changed by {change.score:.0f} standard deviations"
     sizes = sizes_in_words(cause, scene, change.size, change.covariance)
     told = {key: item for key, item in sizes.items() if abs(item.value) > NAMED_STDS * item.std} or sizes
+    if cause.effect == "inertia":
+        mass = sizes.get("mass")
+        if mass is None or abs(mass.value) <= NAMED_STDS * mass.std:
+            # A sum of many parameters has no size of its own.
+            return f" changed by {change.score:.0f} standard deviations"
+        return f" {abs(mass.value):.3g} kg (± {mass.std:.1g}) {'heavier' if mass.value > 0.0 else 'lighter'}"
     shared = cause.candidate is None
     bare = shared or (again and len(sizes) == 1)
     return ",".join(_amount("" if bare else f" {key.replace('_', ' ')}", item, shared) for key, item in told.items())

@@ -9,9 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
+from scara_ident.effects.links import point_mass, tool_of
 from scara_ident.fleet.history import History, noise_of
 from scara_ident.fleet.visit import Visit, _visit
 from scara_ident.model.model import build_model
+from scara_ident.motion.motion import Motion
 from scara_ident.paper import OJD, table5_parameters
 from scara_ident.recording.recording import Recording, write_recording
 from scara_ident.robot.robot import Robot, load_robot
@@ -70,15 +72,34 @@ def drawn(first: Visit, random: np.random.Generator) -> Visit:
 
 
 @cache
+def _swing(speed: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    return sines(np.random.default_rng(3), np.arange(round(SECONDS * RATE)) / RATE, 3, lowest=speed)
+
+
+@cache
+def _of_payload(speed: float) -> np.ndarray:
+    """Torque of 1 kg at the tool, shape (3, N)."""
+    robot, (q, v, a) = scara_with_quill(), _swing(speed)
+    motion = Motion("swing_1", "swing", np.arange(q.shape[1]) / RATE, q, v, a, None, RATE)
+    tool = tool_of(robot)
+    torque = np.einsum("jpt,p->jt", tool.columns(robot, motion), point_mass(tool.point))
+    turns = robot.reduction[1] * q[1]
+    torque[1] += 0.01 * np.sqrt(2.0 * np.mean(torque[1] ** 2)) * np.sin(3.0 * turns)
+    return torque
+
+
+@cache
 def _quill_parts(speed: float) -> tuple[Robot, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     robot, time = scara_with_quill(), np.arange(round(SECONDS * RATE)) / RATE
-    q, v, a = sines(np.random.default_rng(3), time, 3, lowest=speed)
+    q, v, a = _swing(speed)
     rigid = recorded_torque(robot, q, v, a, [(0.0,) * 5] * 3)
     own = robot.drive_sign[:, None] * v
     return robot, time, q, rigid, np.array([np.sign(own), own])
 
 
-def quill_fleet(seed: int, scatter: Sequence[float], gain: float = 0.0, speed: float = 0.3) -> tuple[History, ...]:
+def quill_fleet(
+    seed: int, scatter: Sequence[float], gain: float = 0.0, speed: float = 0.3, payload: float = 0.0
+) -> tuple[History, ...]:
     """Four arms whose last joint goes up and down, on six dates.
 
     Parameters
@@ -88,6 +109,8 @@ def quill_fleet(seed: int, scatter: Sequence[float], gain: float = 0.0, speed: f
         and of the offset of the last joint as a share of its weight.
     gain : float
         By what share of its torque joint 2 of `WORN` is recorded as more from the fourth date on.
+    payload : float
+        What `WORN` carries at its tool from the fourth date on, kg. Of its torque on joint 2 a hundredth is a ripple.
     """
     robot, time, q, rigid, each = _quill_parts(speed)
     model, random, found = build_model(robot), np.random.default_rng(seed), []
@@ -102,6 +125,7 @@ def quill_fleet(seed: int, scatter: Sequence[float], gain: float = 0.0, speed: f
             torque[2] += scatter[3] * np.mean(rigid[2]) * random.standard_normal()
             if arm == WORN and k >= 3:
                 torque[1] *= 1.0 + gain
+                torque += payload * _of_payload(speed)
             run = noisy(recording(robot, "swing_1", time, q, torque), random, noise)
             visits.append(_visit(model, [run], visits[0].reference if visits else None))
         found.append(History(arm, DATES, tuple(visits), model))

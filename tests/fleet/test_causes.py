@@ -70,3 +70,22 @@ def test_an_offset_that_weight_stands_for_is_a_cause_of_its_own_and_differs_from
     k = history.causes.index(offset)
     assert np.linalg.norm(rows.directions[k]) > 0.0
     np.testing.assert_allclose(rows.runs[:, len(RUN_KINDS) * 2 + RUN_KINDS.index("offset")], rows.directions[k][:, 0])
+
+
+def test_a_change_of_masses_is_a_payload_where_a_body_on_the_last_link_makes_it():
+    history = quill_fleet(0, (0.0, 0.0, 0.0, 0.0))[0]
+    term, scene = history.model.rigid_body, history.scene
+    cause = next(cause for cause in history.causes if cause.effect == "inertia")
+    body = np.array([1.5, 0.03, -0.02, 0.0, 0.01, 0.0, 0.01, 0.0, 0.0, 0.02])
+    random = np.random.default_rng(0)
+    root = random.standard_normal((cause.sizes, cause.sizes)) * 1e-3
+    change = term.base.grouping[term.kept, 20:30] @ body
+    told = sizes_in_words(cause, scene, change, root @ root.T)
+    assert list(told) == ["mass"] and told["mass"].unit == "kg"
+    np.testing.assert_allclose(told["mass"].value, 1.5, rtol=1e-6)
+    # As sure as least squares beside the other nine would have it.
+    columns = np.linalg.solve(root, term.base.grouping[term.kept, 20:30])
+    np.testing.assert_allclose(told["mass"].std, np.sqrt(np.linalg.pinv(columns.T @ columns)[0, 0]), rtol=1e-4)
+    # A body on the first link makes another change.
+    other = term.base.grouping[term.kept, 0:10] @ body
+    assert sizes_in_words(cause, scene, other, root @ root.T) == {}

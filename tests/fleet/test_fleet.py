@@ -67,6 +67,8 @@ def test_the_rest_is_complete_and_the_faults_are_listed(first):
     each = table.filter(table["fault"].is_null()).group_by("arm", "date").len()
     assert len(each) == 4 * len(DATES) - 1
     assert each["len"].n_unique() == 1
+    said = {report.arm: "; ".join(report.sentences) or None for report in found.arms}
+    assert dict(table.select("arm", "changes").rows()) == said and said[WORN]
     told = table["fault"].drop_nulls().to_list()
     assert [text.partition(":")[0] for text in told] == [
         f"arm1/{DATES[2]}/OJD_1.parquet", f"arm3/{DATES[1]}/copy_1.parquet", f"arm4/{DATES[0]}/lost_2.parquet", "arm5",

@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from scara_ident.fleet import changes
 from scara_ident.fleet.fleet import changes_of
 from scara_ident.fleet.history import freedom_of
 from scara_ident.fleet.runs import PARTS, joint_scatter, run_scatter
+from scara_ident.fleet.words import sentences
 from tests.fleet.made import WORN, quill_fleet
 
 
@@ -83,6 +85,18 @@ def test_offsets_of_an_axis_that_lifts_are_no_payload_and_what_changes_beside_th
 
 def test_a_slow_axis_that_lifts_has_no_payload_either():
     assert not any(changes_of(quill_fleet(118, (0.02, 0.03, 0.002, 0.02), speed=0.05)).values())
+
+
+def test_a_payload_is_told_in_kg_and_what_it_leaves_over_is_no_other_change(monkeypatch):
+    scatter = (0.02, 0.03, 0.002, 0.02)
+    fleet = quill_fleet(0, scatter, payload=5.0)
+    (told,) = (sentences(found, fleet[1].scene) for found in changes_of(fleet).values() if found)
+    assert told == ("Masses and inertias, as of a payload 5 kg (± 0.007) heavier since 15 April 2026",)
+    both = changes_of(quill_fleet(0, scatter, payload=5.0, gain=0.05))[WORN]
+    assert {change.cause.effect for change in both} == {"inertia", "torque_scale"}
+    # The hundredth of it that is a ripple would be one more.
+    monkeypatch.setattr(changes, "LEAST_BESIDE", 0.0)
+    assert len(changes_of(fleet)[WORN]) == 2
 
 
 def test_coulomb_and_viscous_friction_that_differ_apart_are_no_wear():
