@@ -33,7 +33,7 @@ class SelectionCriteria:
         5e-4,
         "share of its square",
         "what the model nearly spans is known by its own small errors only, unless it removes most of what is left (`dominant`)",
-        "docs/diagnosis.md",
+        "docs/decisions.md",
     )
     abstains: float = _criterion(
         0.05,
@@ -50,7 +50,7 @@ class SelectionCriteria:
         0.05,
         "share of squared residual",
         "removed on rows that it was not fitted to; below it is the detection limit",
-        "docs/diagnosis.md",
+        "docs/decisions.md",
     )
     nearly_all: float = _criterion(
         0.9,
@@ -59,7 +59,7 @@ class SelectionCriteria:
         "diagnosis/row_test.py",
     )
     least_votes: float = _criterion(
-        0.75, "of voting trajectories", "an effect of the arm helps on most motions that excite it", "docs/diagnosis.md"
+        0.75, "of voting trajectories", "an effect of the arm helps on most motions that excite it", "docs/decisions.md"
     )
     least_size: float = _criterion(
         2.5,
@@ -71,11 +71,11 @@ class SelectionCriteria:
         3.0,
         "standard deviations",
         "by which its coefficients differ from none beside all that was found",
-        "0.3 % two-sided; docs/diagnosis.md",
+        "0.3 % two-sided; docs/decisions.md",
     )
     parts: int = _criterion(4, "parts", "of the only trajectory stand in for trajectories where there is but one")
     rotor_inertia_std: float = _criterion(
-        0.2, "of its nominal value", "a data sheet leaves out shaft, brake and wave generator", "docs/diagnosis.md"
+        0.2, "of its nominal value", "a data sheet leaves out shaft, brake and wave generator", "docs/decisions.md"
     )
     # Lines in the residual's spectra, which suggest orders and frequencies to try.
     line_significance: float = _criterion(

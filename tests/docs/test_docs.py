@@ -238,8 +238,8 @@ def test_version_citation_and_changes_agree() -> None:
     assert str(citation["date-released"]) == latest[2]
 
 
-def test_the_diagnosis_page_lists_every_alias_and_the_limits_of_the_program() -> None:
-    page = (DOCS / "diagnosis.md").read_text(encoding="utf-8")
+def test_the_pages_of_the_diagnosis_list_every_alias_and_the_limits_of_the_program() -> None:
+    page = "".join((DOCS / name).read_text(encoding="utf-8") for name in ("diagnosis.md", "decisions.md"))
     assert [alias.effect for alias in HIDDEN if f"`{alias.effect}`" not in page] == []
     for said in (
         f"| lies outside the model | at least {CRITERIA.least_outside:.0e} ",
@@ -268,7 +268,7 @@ def test_the_page_of_criteria_has_each_with_its_value_and_unit() -> None:
 
 
 def test_what_the_readme_says_of_the_diagnosis_adds_up_from_its_page() -> None:
-    page = (DOCS / "diagnosis.md").read_text(encoding="utf-8")
+    page = (DOCS / "accuracy.md").read_text(encoding="utf-8")
     table = page[page.index("Added up, ") :].split("\n\n")[1].splitlines()[2:]
     rows = {line.split("|")[1].strip(): [int(n) for n in re.findall(r"\d+", line.split("|", 2)[2])] for line in table}
     first, *further, total, alone = rows.values()
