@@ -91,6 +91,7 @@ UPPER_ARM = ("shoulder_lift_joint", "elbow_joint")
 # All others are as `simulate --effect NAME` has them.
 CASES = {
     "encoder_eccentricity": Case("encoder_eccentricity:joint1:amplitude=0.0001", rate=500.0),
+    "smooth_coulomb": Case("smooth_coulomb:elbow_joint", UPPER_ARM),
     "backlash": Case("backlash:joint1:width=0.004"),
     "time_delay": Case("time_delay:delay=0.012"),
     "joint_zero": Case("joint_zero:shoulder_lift_joint:offset=0.3", UPPER_ARM),

@@ -20,6 +20,7 @@ from scara_ident.effects.position import Spring
 from scara_ident.effects.presliding import Presliding
 from scara_ident.effects.recording_delays import DelayOfEachRecording
 from scara_ident.effects.shaft import CoupledShaft
+from scara_ident.effects.smooth_coulomb import SmoothCoulomb
 from scara_ident.effects.tilt import BaseTilt, NominalBaseTilt
 from scara_ident.registry import Registry
 
@@ -28,6 +29,7 @@ CATALOGUE: tuple[Effect, ...] = (
     Stribeck(),
     AsymmetricFriction(),
     Presliding(),
+    SmoothCoulomb(),
     WarmUp(),
     PositionDependentFriction(),
     FrictionCoupling(),

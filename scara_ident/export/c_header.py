@@ -8,7 +8,7 @@ from itertools import chain
 
 from scara_ident.export.code import Language, code_lines, inputs_of
 from scara_ident.export.traced_model import TracedModel
-from scara_ident.model.regressor.tracing import ABS, COS, EXP, SIGN, SIN, Scalar
+from scara_ident.model.regressor.tracing import ABS, COS, EXP, SIGN, SIN, TANH, Scalar
 
 _HEAD = """\
 /* Inverse dynamics of {robot}, by scara-ident.
@@ -77,7 +77,7 @@ def c_header(model: TracedModel, about: Sequence[str] = ()) -> str:
         {SIGN: f"{low}_sign({{x}})"}
         | {
             key: f"{up}_OF({word})({{x}})"
-            for key, word in ((SIN, "sin"), (COS, "cos"), (ABS, "fabs"), (EXP, "exp"))
+            for key, word in ((SIN, "sin"), (COS, "cos"), (ABS, "fabs"), (EXP, "exp"), (TANH, "tanh"))
         },
         lambda value: f"{real}{value!r})",
     )  # fmt: skip

@@ -72,7 +72,7 @@ def functions(smooth=0.0):
     return {{item.name(): item for item in result}}
 
 
-sin, cos, exp, fabs = ca.sin, ca.cos, ca.exp, ca.fabs
+sin, cos, exp, fabs, tanh = ca.sin, ca.cos, ca.exp, ca.fabs, ca.tanh
 
 
 {functions}

@@ -21,7 +21,7 @@ class Language:
     output : str
         Element ``{place}`` of ``out``, of ``{value}``.
     functions : mapping of int to str
-        Sine, cosine, size, sign and exponential, of ``{x}``.
+        Sine, cosine, size, sign, exponential and hyperbolic tangent, of ``{x}``.
     number : callable
         Writes a number so that it reads back the same.
     """
@@ -35,7 +35,14 @@ class Language:
 PYTHON = Language(
     "{name} = {value}",
     "out[{place}] = {value}",
-    {op.SIN: "sin({x})", op.COS: "cos({x})", op.ABS: "fabs({x})", op.SIGN: "sign({x})", op.EXP: "exp({x})"},
+    {
+        op.SIN: "sin({x})",
+        op.COS: "cos({x})",
+        op.ABS: "fabs({x})",
+        op.SIGN: "sign({x})",
+        op.EXP: "exp({x})",
+        op.TANH: "tanh({x})",
+    },
     repr,
 )
 """Python, with numbers or whatever else its functions take."""

@@ -11,7 +11,7 @@ from scara_ident.export.traced_model import TracedModel
 
 _TEXT = '''\
 {doc}
-from math import cos, exp, fabs, sin
+from math import cos, exp, fabs, sin, tanh
 from pathlib import Path
 
 import numpy as np

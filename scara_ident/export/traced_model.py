@@ -195,6 +195,7 @@ _FUNCTIONS: dict[np.ufunc, Callable[..., Any]] = {
     np.sin: _of(np.sin, "sin"),
     np.cos: _of(np.cos, "cos"),
     np.exp: _of(np.exp, "exp"),
+    np.tanh: _of(np.tanh, "tanh"),
     np.less: _below,
     np.square: lambda value: value * value,
     np.power: lambda value, power: value**power,

@@ -122,6 +122,8 @@ def _friction(plant: Plant, room: Room, t: float, x: State, start: Array) -> Non
         if plant.presliding[j] > 0.0:
             # The exact solution of Dahl's equation over the way gone since the step began.
             room.direction[j] = slid(dahl[j], theta[j] - start[j], plant.presliding[j])
+        elif plant.smooth_velocity[j] > 0.0:
+            room.direction[j] = np.tanh(w / plant.smooth_velocity[j])
         else:
             room.direction[j] = side
         f = plant.friction[j]

@@ -41,6 +41,7 @@ class Plant(NamedTuple):
     stribeck_velocity: Array
     asymmetry: Array
     presliding: Array
+    smooth_velocity: Array
     warm_share: Array
     warm_time: Array
     position_share: Array
@@ -165,7 +166,7 @@ class PlantDraft:
             | (a["efficiency"] < 1.0)
         )
         seen = np.any(a["coupling_coulomb"] != 0.0, axis=0)
-        matters = (dry & (a["presliding"] == 0.0)) | (seen & (a["presliding"] == 0.0))
+        matters = (dry | seen) & (a["presliding"] == 0.0) & (a["smooth_velocity"] == 0.0)
         integers = {
             "parent",
             "shaft_other",
@@ -191,7 +192,7 @@ def empty_draft(n: int, scale: Array, reduction: Array) -> PlantDraft:
     """Return a draft with no effect and no bodies; the arm fills in the rest."""
     zero = np.zeros(n)
     per_joint = (
-        "constant stribeck_amplitude asymmetry presliding warm_share position_share position_phase spring "
+        "constant stribeck_amplitude asymmetry presliding smooth_velocity warm_share position_share position_phase spring "
         "spring_rest elastic stiffness damping width signed_sine swinging_viscous"
     )
     arrays: dict[str, Array] = {name: zero.copy() for name in per_joint.split()}

@@ -32,7 +32,8 @@ class TrueMotion:
     load : ndarray
         Torque through the gear, without the rotor's own inertia, at the joint.
     direction : ndarray
-        What dry friction is multiplied with: sign of the velocity, 0 where the joint sticks, or the presliding state.
+        What dry friction is multiplied with: sign of the velocity, 0 where the joint sticks, the presliding state, or what is
+        between -1 and 1 at a low speed.
     """
 
     position: Array
@@ -135,7 +136,7 @@ def _stretch(draft: PlantDraft, torque: Array) -> Array:
 
 
 def needed_substeps(arm: VirtualArm, draft: PlantDraft, rate: float) -> int:
-    """Return how many steps per sample the stiffest elastic joint or presliding friction needs.
+    """Return how many steps per sample the stiffest elastic joint or dry friction needs.
 
     Raises
     ------
@@ -153,6 +154,9 @@ def needed_substeps(arm: VirtualArm, draft: PlantDraft, rate: float) -> int:
     dry = arrays["friction"][:, 0] + arrays["stribeck_amplitude"]
     sliding = arrays["presliding"]
     square += np.divide(4.0 * dry, sliding * (link + rotor), out=np.zeros(draft.n), where=sliding > 0.0)
+    # Friction over so small a speed decays as fast as a spring of that frequency swings.
+    smooth = arrays["smooth_velocity"]
+    square += np.divide(4.0 * dry, smooth * (link + rotor), out=np.zeros(draft.n), where=smooth > 0.0) ** 2
     for i, j, coulomb in zip(*(arrays[f"shaft_{name}"] for name in ("joint", "other", "coulomb")), strict=True):
         both = np.array([i, j], dtype=int)
         square[both] += 4.0 * coulomb / (SHAFT_WAY * (link + rotor)[both])
@@ -161,6 +165,6 @@ def needed_substeps(arm: VirtualArm, draft: PlantDraft, rate: float) -> int:
         joint = arm.robot.joints[int(np.flatnonzero(arm.robot.order == int(np.argmax(square)))[0])]
         raise UsageError(
             f"{joint}: so stiff that {needed} steps per sample would be needed (at most {MOST_SUBSTEPS}); "
-            "lower its stiffness or raise its presliding distance"
+            "lower its stiffness, or raise its presliding distance or the speed over which its friction builds up"
         )
     return needed

@@ -14,7 +14,7 @@ from tests.export.arms import Array, random_standard
 
 # One of each kind: with the load, at low speed, by direction, by position, by another joint, and of the measurement.
 EFFECTS = (
-    "transmission_loss", "stribeck", "asymmetric_friction", "position_dependent_friction", "torque_ripple",
+    "transmission_loss", "stribeck", "smooth_coulomb", "asymmetric_friction", "position_dependent_friction", "torque_ripple",
     "encoder_eccentricity", "torque_sensor_nonlinearity", "inertia_coupling",
 )  # fmt: skip
 NOISE = 1e-3

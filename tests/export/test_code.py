@@ -16,18 +16,19 @@ def test_code_does_what_was_recorded_and_its_output_may_be_an_input() -> None:
         abs(a[1] - 2.5) * (-q[1]).exp() - cos(q[0]) * -3.0,
         -0.25,
         v[0] - v[0],
+        (-2.0 * v[1]).tanh(),
     ]
     lines = code_lines(trace, outputs, PYTHON, 2)
     assert inputs_of(trace, outputs, 2) == "qva"
-    assert inputs_of(trace, outputs[2:], 2) == ""
+    assert inputs_of(trace, outputs[2:4], 2) == ""
     names = {
-        "sin": math.sin, "cos": math.cos, "exp": math.exp, "fabs": abs, "sign": np.sign,
-        "q": [0.3, -0.2], "v": [-1.5, 0.7], "a": [0.0, 1.0], "out": [0.0] * 4,
+        "sin": math.sin, "cos": math.cos, "exp": math.exp, "fabs": abs, "sign": np.sign, "tanh": math.tanh,
+        "q": [0.3, -0.2], "v": [-1.5, 0.7], "a": [0.0, 1.0], "out": [0.0] * 5,
     }  # fmt: skip
     first = next(k for k, line in enumerate(lines) if line.startswith("out"))
     assert all(line.startswith("out") for line in lines[first:])
     exec("\n".join(lines), names)
-    expected = [-math.sin(0.3) * 0.7 - 0.1, 1.5 * math.exp(0.2) + 3.0 * math.cos(0.3), -0.25, 0.0]
+    expected = [-math.sin(0.3) * 0.7 - 0.1, 1.5 * math.exp(0.2) + 3.0 * math.cos(0.3), -0.25, 0.0, -math.tanh(1.4)]
     np.testing.assert_allclose(names["out"], expected, rtol=1e-15)
 
 

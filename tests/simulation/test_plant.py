@@ -36,8 +36,10 @@ def test_constants_are_brought_to_the_joint_side():
 def test_the_direction_matters_where_a_torque_jumps_with_it(draft: PlantDraft, name: str, value: float):
     draft.arrays[name][1] = value
     np.testing.assert_array_equal(draft.plant().direction_matters, [False, True])
-    draft.arrays["presliding"][1] = 0.01  # then it grows with the way instead of jumping
-    np.testing.assert_array_equal(draft.plant().direction_matters, [False, False])
+    for grows in ("presliding", "smooth_velocity"):
+        draft.arrays[grows][1] = 0.01  # then it grows with the way, or the speed, instead of jumping
+        np.testing.assert_array_equal(draft.plant().direction_matters, [False, False])
+        draft.arrays[grows][1] = 0.0
 
 
 def test_coupled_coulomb_friction_makes_the_other_joints_direction_matter(draft: PlantDraft):

@@ -58,6 +58,8 @@ def gradient(values: Sequence[Scalar], seeds: Sequence[Scalar], variables: Seque
             add(first, slope * x.direction())
         elif operation == op.EXP:
             add(first, slope * Expr(trace, node, second))
+        elif operation == op.TANH:
+            add(first, slope * (1.0 - Expr(trace, node, 1) ** 2))
     return [slopes.get(variable.node, 0.0) * variable.sign for variable in variables]
 
 
@@ -98,6 +100,8 @@ def derivative(values: Sequence[Scalar], variable: Expr) -> list[Scalar]:
             found = x.direction() * along
         elif operation == op.EXP:
             found = Expr(trace, node, second) * along
+        elif operation == op.TANH:
+            found = (1.0 - Expr(trace, node, 1) ** 2) * along
         if operation != op.SIGN and not (isinstance(found, float) and found == 0.0):
             slopes.setdefault(node, found)
     return [slopes.get(value.node, 0.0) * value.sign if isinstance(value, Expr) else 0.0 for value in values]

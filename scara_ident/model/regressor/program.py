@@ -49,6 +49,7 @@ class Program:
             "absolute": np.absolute,
             "sign": np.sign,
             "exp": np.exp,
+            "tanh": np.tanh,
             "copy": np.copyto,
         }
         # As arrays without dimension: a Python float would be converted in every operation.

@@ -16,7 +16,7 @@ import numpy as np
 from scara_ident.arrays import Array
 from scara_ident.model.regressor.program import Program
 
-VAR, SIN, COS, ADD, SUB, MUL, ADD_CONST, MUL_CONST, SIGN, ABS, EXP = range(11)
+VAR, SIN, COS, ADD, SUB, MUL, ADD_CONST, MUL_CONST, SIGN, ABS, EXP, TANH = range(12)
 
 _BINARY = (ADD, SUB, MUL)
 """Operations on two nodes."""
@@ -136,6 +136,10 @@ class Expr:
     def exp(self) -> Expr:
         """Return the exponential."""
         return Expr(self.trace, self.trace.node(EXP, self.node, self.sign), 1)
+
+    def tanh(self) -> Expr:
+        """Return the hyperbolic tangent."""
+        return Expr(self.trace, self.trace.node(TANH, self.node, 0), self.sign)
 
     def direction(self) -> Expr:
         """Return -1, 0 or 1, the sign that the value will have."""
@@ -270,7 +274,7 @@ class _Emitter:
                     if operand not in wish and self.nodes[operand][0] not in (VAR, SIN, COS):
                         wish[operand] = -1
                         break
-            elif operation == SIN and first not in wish:
+            elif operation in (SIN, TANH) and first not in wish:
                 wish[first] = -1
         return wish
 
@@ -289,8 +293,8 @@ class _Emitter:
         """Return the operation of `node` and the sign of its result, which is `sign` where that is free."""
         operation, first, second = self.nodes[node]
         x, sign_x = self.place[first], self.stored[first]
-        if operation == SIN:
-            return f"sin({x}", sign_x
+        if operation in (SIN, TANH):
+            return f"{'sin' if operation == SIN else 'tanh'}({x}", sign_x
         if operation in (COS, ABS):
             return f"{'cos' if operation == COS else 'absolute'}({x}", 1
         if operation == SIGN:

@@ -15,6 +15,7 @@ from scara_ident.simulation.effects.friction import (
     FrictionCoupling,
     PositionDependentFriction,
     Presliding,
+    SmoothCoulomb,
     Stribeck,
     WarmUp,
 )
@@ -53,7 +54,7 @@ CATALOGUE: tuple[type[Effect], ...] = (
     Vibration,
 )
 # What an arm may have or meet beside them.
-OTHERS: tuple[type[Effect], ...] = (Push, Payload, CoupledShaft, JointZero)
+OTHERS: tuple[type[Effect], ...] = (Push, Payload, CoupledShaft, JointZero, SmoothCoulomb)
 UNLISTED: tuple[type[Effect], ...] = (UnlistedSignedSine, UnlistedSwingingViscous)
 EFFECTS: dict[str, type[Effect]] = {effect.name: effect for effect in (*CATALOGUE, *OTHERS, *UNLISTED)}
 

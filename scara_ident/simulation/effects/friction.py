@@ -71,6 +71,18 @@ class Presliding(Effect):
 
 
 @dataclass(frozen=True)
+class SmoothCoulomb(Effect):
+    """Dry friction without a jump: all of it is times ``tanh(v/velocity)`` where it was times sign(v). The joint then never sticks."""
+
+    name: ClassVar[str] = "smooth_coulomb"
+    units: ClassVar[dict[str, str]] = {"velocity": "rad/s"}
+    bounds: ClassVar[dict[str, tuple[float, float]]] = {"velocity": (0.0, np.inf)}
+    ways: ClassVar[dict[str, float]] = {"velocity": 0.05}
+    arrays: ClassVar[dict[str, str]] = {"velocity": "smooth_velocity"}
+    velocity: float = BY_ARM
+
+
+@dataclass(frozen=True)
 class WarmUp(Effect):
     """Friction that is larger at the start of a run: the polynomial times ``1 + share exp(-t/time_constant)``."""
 

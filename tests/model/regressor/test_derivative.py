@@ -17,13 +17,13 @@ def test_every_operation_has_the_slope_of_a_complex_step() -> None:
     trace = Trace()
     x, y = trace.variable(0), trace.variable(1)
 
-    def function(x, y, sin, cos, exp):
-        return 3.0 * sin(x * y) - cos(2.0 * x - y) * x + exp(-x * x) * (y - x + 1.0)
+    def function(x, y, sin, cos, exp, tanh):
+        return 3.0 * sin(x * y) - cos(2.0 * x - y) * x + exp(-x * x) * (y - x + 1.0) - y * tanh(y - 3.0 * x)
 
-    value = function(x, y, sin, cos, lambda z: z.exp())
+    value = function(x, y, sin, cos, lambda z: z.exp(), lambda z: z.tanh())
     inputs = np.random.default_rng(0).uniform(-2.0, 2.0, (2, 50))
     found = evaluate(trace, derivative([value], x)[0], inputs)
-    step = function(inputs[0] + 1e-30j, inputs[1] + 0j, np.sin, np.cos, np.exp).imag / 1e-30
+    step = function(inputs[0] + 1e-30j, inputs[1] + 0j, np.sin, np.cos, np.exp, np.tanh).imag / 1e-30
     np.testing.assert_allclose(found, step, rtol=1e-13, atol=1e-13)
     backwards = gradient([x * y, value], [0.0, 2.0], [x, y])
     np.testing.assert_allclose(evaluate(trace, backwards[0], inputs), 2.0 * step, rtol=1e-13, atol=1e-13)

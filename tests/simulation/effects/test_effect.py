@@ -27,6 +27,7 @@ NOTHING = [
     fx.Stribeck(amplitude=0.0),
     fx.AsymmetricFriction(viscous_difference=0.0),
     fx.Presliding(presliding_distance=0.0),
+    fx.SmoothCoulomb(velocity=0.0),
     fx.WarmUp(share=0.0),
     fx.TorqueRipple(amplitude=0.0),
     fx.PositionDependentFriction(share=0.0),
@@ -123,6 +124,7 @@ def test_sizes_on_the_joint_side_are_n_times_the_motors() -> None:
         (["torque_gain_mismatch:joint1"], "a joint other than joint1"),
         (["spring", "spring:joint1"], "given twice for joint1"),
         (["presliding:presliding_distance=1e-12"], "so stiff"),
+        (["smooth_coulomb:velocity=1e-12"], "so stiff"),
         (["offset_drift:rate=nan"], None),
     ],
 )
@@ -141,7 +143,7 @@ def test_lengths_that_an_effect_of_a_slide_has_are_shares_of_its_stroke(unit: fl
     # What they are of a joint that turns, rad.
     lengths = {
         ("stribeck", "velocity"): 0.1, ("presliding", "presliding_distance"): 0.005, ("backlash", "width"): 0.001,
-        ("spring", "rest_position"): 0.3, ("joint_zero", "offset"): 0.05,
+        ("smooth_coulomb", "velocity"): 0.05, ("spring", "rest_position"): 0.3, ("joint_zero", "offset"): 0.05,
     }  # fmt: skip
     arm = virtual_arm(in_unit(CYLINDRICAL, unit, tmp_path))
     for (name, key), turn in lengths.items():

@@ -29,6 +29,14 @@ def test_presliding_state_follows_dahls_equation() -> None:
     np.testing.assert_allclose(true.direction[0], z, atol=1e-4)
 
 
+def test_smooth_friction_follows_the_speed_and_the_joint_never_sticks() -> None:
+    result = run(fx.SmoothCoulomb("joint1", 0.05), duration=4.0)
+    true = result.true
+    assert np.nanmax(np.abs(left_over(result.arm, true))) < 1e-10
+    np.testing.assert_allclose(true.direction[0], np.tanh(true.velocity[0] / 0.05), atol=1e-12)
+    assert np.count_nonzero(np.abs(true.direction[0]) < 0.9) > 20
+
+
 EQUATIONS: dict[Effect, Callable[[SimulationResult], Array]] = {
     fx.Stribeck("joint1", 0.1, 0.3): lambda r: 0.1 * r.true.direction[0] * np.exp(-((r.true.velocity[0] / 0.3) ** 2)),
     fx.AsymmetricFriction("joint2", 0.03): lambda r: 0.015 * abs(r.true.velocity[1]),
