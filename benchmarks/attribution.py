@@ -24,7 +24,7 @@ from attribution_tables import describe, report
 from attribution_truth import Item, set_alone
 from compare_commits import sources
 from virtual_conditions import Asked
-from virtual_sets import KINDS, add_conditions, asked_for, tasks
+from virtual_sets import KINDS, WHERE_ASKED, add_conditions, asked_for, tasks
 
 import scara_ident
 from scara_ident.fleet.engine import run_all
@@ -88,7 +88,7 @@ def main() -> None:
     parser.add_argument("--robot", default="scara03", help="scara03, a robot of example-robot-data or a URDF")
     parser.add_argument("--sets", type=int, default=300)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--only", nargs="*", choices=sorted(set(KINDS)), help="kinds to draw")
+    parser.add_argument("--only", nargs="*", choices=sorted({*KINDS, *WHERE_ASKED}), help="kinds to draw")
     parser.add_argument("--jobs", type=int, default=2, help="sets side by side on this machine")
     parser.add_argument("--scheduler", help="address of a Dask scheduler, whose workers have this folder in their path")
     parser.add_argument("--limit", type=int, default=900, help="seconds after which a diagnosis is given up")

@@ -68,6 +68,8 @@ SIZE = {
     "offset_drift": "rate",
     "vibration": "amplitude",
 }
+# Drawn only where asked for, so that seeds keep their sets.
+WHERE_ASKED = {"smooth_coulomb": "velocity"}
 # Elasticity is the larger the smaller its parameter.
 INVERSE = ("joint_elasticity",)
 WHOLE_ARM = ("base_tilt", "payload_change", "time_delay")
@@ -221,7 +223,8 @@ def _random_effect(name: str, factor: float, arm: VirtualArm, rng: np.random.Gen
         return replace(effect, viscous=factor * effect.viscous, coulomb=factor * effect.coulomb)
     if name in INVERSE:
         return replace(effect, stiffness=effect.stiffness / factor)
-    keys = [SIZE[name]] if name in SIZE else [key for key in ("amplitude", "viscous") if hasattr(effect, key)]
+    sizes = SIZE | WHERE_ASKED
+    keys = [sizes[name]] if name in sizes else [key for key in ("amplitude", "viscous") if hasattr(effect, key)]
     values = {key: factor * getattr(effect, key) for key in keys}
     effect = replace(effect, **{key: min(value, 0.9) if key in SHARES else value for key, value in values.items()})
     if name == "payload_change":

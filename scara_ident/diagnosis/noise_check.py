@@ -19,9 +19,13 @@ from scara_ident.errors import RecordingError
 from scara_ident.estimation.noise_bias import noisy
 from scara_ident.estimation.run_offsets import offsets_on
 from scara_ident.motion.position_noise import noise_sizes
+from scara_ident.motion.rest import stepping_speeds
 
 # How each reason begins that positions with less noise would settle.
 BY_NOISE = "the noise of the positions"
+# Friction that changes below the speed at which a joint makes as many steps in a period of its positions' filter is the work of
+# a controller that answers each step: behind 12 bits friction that jumps seemed to grow over 4 times the speed of one step; twice that is asked.
+STEPS_OF_SPEED = 8.0
 
 
 def noise_objection(step: SelectionStep, decision: Decision) -> str | None:
@@ -78,15 +82,23 @@ def made_by_noise(step: SelectionStep, decision: Decision) -> str | None:
 
 
 def within_a_step(step: SelectionStep, candidate: Candidate) -> str | None:
-    """Say so where an effect turns on a way that the encoder's steps hide: it mends the sign of friction where they spoil it."""
-    way, joint = candidate.effect.shortest_way(candidate.member), candidate.member.joint
-    if joint is None or not np.isfinite(way):
+    """Say so where an effect turns on a way or a speed that the encoder's steps hide: it mends the sign of friction where they spoil it."""
+    joint = candidate.member.joint
+    way, speed = candidate.effect.turns_on(candidate.member)
+    if joint is None or not (np.isfinite(way) or np.isfinite(speed)):
         return None
-    sizes = [part[joint][0] or 0.0 for parts in noise_sizes(step.observations.data) for part in parts]
-    unit = step.scene.robot.position_unit(joint)
-    if way >= max(sizes, default=0.0):
-        return None
-    return f"it turns on {way:.2g} {unit}, less than a step of the encoder, {max(sizes):.2g} {unit}"
+    data, unit = step.observations.data, step.scene.robot.position_unit(joint)
+    steps = max((part[joint][0] or 0.0 for parts in noise_sizes(data) for part in parts), default=0.0)
+    if way < steps:
+        return f"it turns on {way:.2g} {unit}, less than a step of the encoder, {steps:.2g} {unit}"
+    parts = (part for recording in data.recordings for part in recording.stretches)
+    stepping = max(float(stepping_speeds(part.stretch, part.motion.cuts)[joint]) for part in parts)
+    if speed < STEPS_OF_SPEED * stepping:
+        return (
+            f"friction would be another one below {speed:.2g} {unit}/s, where a controller that answers the encoder's steps shakes the joint: "
+            f"below {stepping:.2g} {unit}/s these come one by one"
+        )
+    return None
 
 
 def _gone_further_down(step: SelectionStep, decision: Decision) -> str | None:

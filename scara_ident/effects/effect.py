@@ -302,9 +302,9 @@ class Effect(ABC):
         """Return the band, Hz, that holds where a member shows most; 0 where every band does."""
         return 0.0
 
-    def shortest_way(self, member: Member) -> float:
-        """Return the shortest way of its joint that a member turns on, rad or m; infinite where none does."""
-        return np.inf
+    def turns_on(self, member: Member) -> tuple[float, float]:
+        """Return the shortest way of its joint, rad or m, and the lowest speed that a member turns on; infinite where none does."""
+        return np.inf, np.inf
 
     def knowing(self, unloaded: frozenset[str]) -> Effect:
         """Return the family that knows the names of recordings in which the arm carries nothing."""

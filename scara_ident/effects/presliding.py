@@ -76,9 +76,9 @@ class Presliding(Effect):
             return f"it would be more than {LARGEST_COULOMB_SHARE:g} times the Coulomb friction"
         return None
 
-    def shortest_way(self, member: Member) -> float:
+    def turns_on(self, member: Member) -> tuple[float, float]:
         """Return the distance: where a reversal is must be known better."""
-        return member.nonlinear[0]
+        return member.nonlinear[0], np.inf
 
     def parameters(self, scene: Scene, member: Member, value: Array, covariance: Array) -> Mapping[str, Parameter]:
         """Return the friction that follows the state; the distance is a nonlinear parameter."""

@@ -12,8 +12,8 @@ from scara_ident.effects.friction import WIDEST_STRIBECK, friction_of
 from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, View
 from scara_ident.effects.signals import Scene, Signals
 
-# Speeds tried, as shares of the joint's largest: three times apart, which refinement bridges.
-SPEED_SHARES = (0.004, 0.012, 0.036, 0.1, 0.25)
+# Speeds tried, as shares of the joint's largest: four times apart, which refinement bridges.
+SPEED_SHARES = (0.01, 0.04, 0.16)
 # What changes its sign smoothly is at least this many times what slides, or it is something else; and at most so many times.
 SMALLEST_SHARE, LARGEST_SHARE = 0.4, 1.5
 
@@ -48,6 +48,10 @@ class SmoothCoulomb(Effect):
         j = member.place
         drive = signals.scene.robot.drive_sign[j] * signals.motion.v[j]
         return [np.tanh(drive / member.nonlinear[0]) - signals.sign[j]]
+
+    def turns_on(self, member: Member) -> tuple[float, float]:
+        """Return the velocity: of slower joints it must be known which way they go."""
+        return np.inf, member.nonlinear[0]
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """Say so where what builds up is not what then slides, or the joint is never fast against its speed."""
