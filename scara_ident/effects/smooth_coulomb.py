@@ -8,7 +8,7 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.effects.effect import DOUBT_STDS, Effect
-from scara_ident.effects.friction import WIDEST_STRIBECK, friction_of
+from scara_ident.effects.friction import SLOWEST_STRIBECK, WIDEST_STRIBECK, friction_of
 from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, View
 from scara_ident.effects.signals import Scene, Signals
 
@@ -42,6 +42,13 @@ class SmoothCoulomb(Effect):
     def scan(self, scene: Scene, joint: int) -> Iterable[tuple[float, ...]]:
         """Return shares of the joint's largest speed."""
         return ((share * float(scene.speed[joint]),) for share in SPEED_SHARES)
+
+    def limits(self, scene: Scene, member: Member) -> tuple[tuple[float, float], ...]:
+        """Return shares of the largest speed of a joint that slides, whose speeds may be those of a stage or of a gantry."""
+        if not scene.robot.prismatic[member.place]:
+            return super().limits(scene, member)
+        speed = float(scene.speed[member.place])
+        return ((SLOWEST_STRIBECK * speed, speed),)
 
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
         """Return ``tanh(v/velocity) - sign(v)`` in the drive's direction."""

@@ -28,6 +28,7 @@ from scara_ident.effects.elasticity import JointElasticity
 from scara_ident.effects.measurement import TimeDelay, shifted
 from scara_ident.effects.position import Spring
 from scara_ident.effects.presliding import Presliding
+from scara_ident.effects.smooth_coulomb import SmoothCoulomb
 from scara_ident.estimation.joint_rows import JointRows
 from scara_ident.recording.recording import Recording
 from scara_ident.simulation import parse_effect, simulate, virtual_arm
@@ -139,6 +140,19 @@ def test_what_turns_within_a_step_of_the_encoder_is_not_believed(steps: float, h
     assert ("less than a step of the encoder, 0.00077 rad" in (said or "")) == hidden
     (other,) = step.judge([Candidate(Spring(), Member(1))])
     assert "step" not in (noise_objection(step, other) or "")
+
+
+@pytest.mark.parametrize(("share", "hidden"), [(4.0, True), (20.0, False)])
+def test_friction_that_is_another_one_where_steps_come_one_by_one_is_not_believed(share: float, hidden: bool) -> None:
+    """Behind 12 bits a controller's answer to each step made friction that jumps grow with speed."""
+    encoder = 2.0 * np.pi / 2**13
+    runs = [replace(run, position=encoder * np.round(run.position / encoder)) for run in exact_runs()]
+    step = step_beside(runs)
+    (part,) = step.observations.data.recordings[0].stretches
+    stepping = encoder * part.motion.cuts[1]
+    (decision,) = step.judge([Candidate(SmoothCoulomb(), Member(1, (share * stepping,)))])
+    said = noise_objection(step, decision)
+    assert (f"below {stepping:.2g} rad/s these come one by one" in (said or "")) == hidden
 
 
 def answering(runs: list[Recording], gains: dict[int, float], size: float) -> list[Recording]:
