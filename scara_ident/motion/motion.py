@@ -22,6 +22,8 @@ from scara_ident.threads import LONG, THREADS, side_by_side, threads_for, works_
 
 # A time step that differs by less than this share from the median is not jitter.
 UNIFORM_TOLERANCE = 1e-3
+# Between two gaps a joint that travels less than this share of what it does in the whole recording is held by its servo.
+HELD_SHARE = 1e-3
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -118,6 +120,8 @@ class Stretch:
         Samples of the recording that it was made of.
     clipped : ndarray of bool, shape (n, N), or False
         Where a torque is at the value at which the recording is clipped, or stuck most of the time.
+    idle : ndarray of bool, shape (n,), or False
+        Joints that are held by their servos all the while: of a tremor nothing is learnt, however fast it is beside itself.
     steps : tuple of float or None, one per joint
         In which its encoder has the recorded positions, see `encoder_step`; empty where nobody looked.
     """
@@ -130,6 +134,7 @@ class Stretch:
     rate: float
     source: slice
     clipped: NDArray[np.bool_] | bool = False
+    idle: NDArray[np.bool_] | bool = False
     steps: tuple[float | None, ...] = ()
     _filtered: dict[tuple[int, float | None], tuple[Array, Array, Array]] = field(default_factory=dict, repr=False)
     _thinned: dict[int, Stretch] = field(default_factory=dict, repr=False)
@@ -190,11 +195,14 @@ def stretches(recording: Recording) -> tuple[Stretch, ...]:
     bounds = cut_long(sorted({0, *cuts.tolist(), *recording.cuts, len(recording.time)}))
     # On another time grid positions are between the steps.
     steps = tuple(encoder_step(row) for row in recording.position)
+    idle = np.isin(np.arange(len(recording.joints)), [joint for item in recording.findings for joint in item.idle])
+    least = HELD_SHARE * np.ptp(recording.position, axis=1)
     found = []
     for start, stop in pairwise(bounds):
         if stop - start < 4:
             continue
-        found.append(replace(_uniform(recording, start, stop, middle), steps=steps))
+        held = idle | (np.ptp(recording.position[:, start:stop], axis=1) < least)
+        found.append(replace(_uniform(recording, start, stop, middle), idle=held, steps=steps))
     if not found:
         raise RecordingError(f"{recording.path or recording.name}: no four samples in a row without a gap in time")
     return tuple(found)
@@ -299,6 +307,7 @@ def thinned(stretch: Stretch, step: int) -> Stretch:
             stretch.rate / step,
             stretch.source,
             stretch.clipped if isinstance(stretch.clipped, bool) else _means(stretch.clipped.astype(float), step) > 0.0,
+            stretch.idle,
             stretch.steps,
         )
     torque = None if stretch.torque is None else _means(stretch.torque, step)

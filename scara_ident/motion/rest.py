@@ -73,13 +73,14 @@ def _narrowest(rate: float, bands: Bands) -> list[float | None]:
 
 
 def standstill(stretch: Stretch, motion: Motion, bands: Bands) -> NDArray[np.bool_]:
-    """Return where each joint stands still, shape (n, N), widened by the memory of the position's filter.
+    """Return where each joint stands still, shape (n, N), widened by the memory of the position's filter; all of it where it is held.
 
     So is where it turns sharply, however fast: friction jumps there and the acceleration with it, and the filter, which
     rounds that off, moves the time of the turn. Where samples are few, so is every turn.
     """
     speeds, stepping = rest_speeds(stretch, motion, bands), stepping_speeds(stretch, motion.cuts)
     found = slower(motion.v, speeds, stretch.rate, bands)
+    found[stretch.idle] = True
     if np.any(stepping >= speeds):
         # Where steps decide a joint goes to and fro, for half a period of the filter each way, however long that is.
         found |= slower(motion.v, np.where(stepping >= speeds, stepping, -1.0), stretch.rate, bands, longest=np.inf)

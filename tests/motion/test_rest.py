@@ -8,14 +8,16 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from scara_ident.identification.identify import identify
 from scara_ident.motion.low_pass import low_pass
 from scara_ident.motion.motion import motion_of
 from scara_ident.motion.position_noise import noisier
 from scara_ident.motion.prepared import PreparedStretch, prepare
 from scara_ident.motion.rest import FEW_SAMPLES, fading, rest_speeds, slower
 from scara_ident.recording.recording import Recording
+from scara_ident.recording.tables import read_arrays
 from scara_ident.robot.robot import load_robot
-from tests.arms import PLANAR_2R, swing, write_urdf
+from tests.arms import PLANAR_2R, noisy, recorded_torque, recording, sines, swing, write_urdf
 
 RATE = 500.0
 BANDS = (10.0, 10.0)
@@ -178,3 +180,45 @@ def test_a_joint_that_stands_has_no_speed_of_the_filter_that_rings(run: Recordin
     before = (time > 3.0) & (time < 3.7)
     assert np.max(np.abs(narrow.v[0, before])) > 0.003 > 50.0 * np.max(np.abs(part.motion.v[0, before]))
     assert np.all(part.motion.v[part.used] > 0.0)
+
+
+COULOMB, VISCOUS = np.array([0.1, 0.03]), np.array([0.05, 0.01])
+
+
+def scara_run(seed: int, held_since: float = np.inf) -> Recording:
+    """Twelve seconds of a SCARA03, audited, whose second joint is held from some time on by its servo: it trembles by 0.2 mrad."""
+    robot, time = load_robot(), np.arange(3000) / 250.0
+    q, v, a = sines(np.random.default_rng(seed), time, robot.n)
+    late, angle = time >= held_since, 2.0 * np.pi * 1.3 * (time - min(held_since, time[-1]))
+    for signal, part in zip(
+        (q, v, a), (2e-4 * np.sin(angle), 1.6e-3 * np.cos(angle), -1.3e-2 * np.sin(angle)), strict=True
+    ):
+        signal[1, late] = part[late]
+    q[1, late] += q[1, ~late][-1] if np.any(~late) else 0.3
+    speed = robot.drive_sign[:, None] * v
+    # It never breaks away: friction is what its servo happens to push.
+    side = np.where(late & (np.arange(2) == 1)[:, None], 0.3 * np.sin(angle), np.sign(speed))
+    torque = recorded_torque(robot, q, v, a, [(0.0,) * 5] * 2) + COULOMB[:, None] * side + VISCOUS[:, None] * speed
+    made = noisy(recording(robot, f"run{seed}_1", time, q, torque), np.random.default_rng(seed), (0.005, 0.001))
+    assert made.effort is not None
+    return read_arrays(time, made.position.T, made.effort.T, robot, name=made.name)
+
+
+def test_a_joint_that_is_held_all_the_while_is_at_rest_however_its_servo_trembles():
+    """Of its tremor's own peak speed a share was rest, and friction was learnt of 0.2 mrad of travel."""
+    still = scara_run(0, held_since=0.0)
+    assert [finding.idle for finding in still.findings if finding.idle] == [(1,)]
+    (part,) = prepare([still]).at((10.0, 10.0)).recordings[0].stretches
+    assert not np.any(part.used[1]) and np.mean(part.used[0]) > 0.8
+    # What others say of it stays what it was.
+    moved = [scara_run(seed) for seed in (1, 2)]
+    alone, beside = (identify(load_robot(), runs) for runs in (moved, [*moved, still]))
+    own = [alone.estimate.model.names.index(name) for name in ("a02", "a12", "a22", "a32")]
+    off = np.abs(beside.estimate.value - alone.estimate.value)[own] / alone.estimate.std[own]
+    assert np.max(off) < 1.0
+
+
+def test_a_joint_that_is_held_between_two_gaps_is_at_rest_there():
+    still = replace(scara_run(0, held_since=6.0), cuts=(1500,))
+    first, second = prepare([still]).at((10.0, 10.0)).recordings[0].stretches
+    assert np.mean(first.used[1]) > 0.5 and not np.any(second.used[1])

@@ -213,11 +213,11 @@ def idle_joints(samples: Samples) -> Checked:
     small = f"(travel at most {travel:.2g} {samples.robot.position_unit(int(which[0]))})"
     if idle.all() and len(which) > 1:
         said = f"no joint moves {small}: gravity and offsets can be learnt, nothing of motion"
-        return samples, [Finding("idle_joint", said, len(which))]
+        return samples, [Finding("idle_joint", said, len(which), idle=tuple(which.tolist()))]
     names = ", ".join(samples.robot.joints[k] for k in which)
     verb, their = ("does", "its") if len(which) == 1 else ("do", "their")
     said = f"{names} {verb} not move {small}: nothing is learnt of {their} motion"
-    return samples, [Finding("idle_joint", said, len(which))]
+    return samples, [Finding("idle_joint", said, len(which), idle=tuple(which.tolist()))]
 
 
 def limits(samples: Samples) -> Checked:

@@ -43,12 +43,15 @@ class Finding:
         How many samples (gaps, joints) it concerns.
     clipped : (int, float) or None
         A joint by its place and the torque at which its effort is clipped or stuck, N m or N.
+    idle : tuple of int
+        Joints by their places that stand still over the whole recording.
     """
 
     kind: str
     message: str
     count: int = 1
     clipped: tuple[int, float] | None = None
+    idle: tuple[int, ...] = ()
 
 
 def once(findings: Iterable[Finding]) -> list[Finding]:
