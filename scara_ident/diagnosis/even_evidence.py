@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache, partial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
@@ -27,7 +28,8 @@ def even_evidence(
     """Take back that a residual is noise where one recording leaves much more of it than all others do.
 
     What acts in one recording, such as a load, may be as white as noise, and no repetition shows it. Nothing is taken back
-    where without what runs were found to differ by no recording stands out, nor one in what it differs by.
+    where without what runs were found to differ by no recording stands out, nor one in what it differs by, nor where
+    the repetitions of a motion leave as much, as where noise grows with the motion: what else a motion leaves more of repeats.
 
     Parameters
     ----------
@@ -43,17 +45,17 @@ def even_evidence(
             for own in training.each
         ]
     )
+    motions = np.array(training.data.labels)
     # Made where it matters only: it takes recordings that are noisier.
     made = cache(lambda place: noise_torque(training.each[place], after.value))
     found = []
     for j, item in enumerate(shown):
-        loud = _loudest(squares[:, j], rows[:, j], partial(_of_joint, made, j), criteria)
+        left = _Left(squares[:, j], rows[:, j], motions, partial(_of_joint, made, j))
+        loud = left.loudest(criteria)
         if item.shown and loud is not None and _throughout(training, j, after.value, loud[0], criteria):
             place, ratio = loud
             own = after.variation.joints[j] if after.variation is not None else None
-            differing = own is not None and _as_runs_differ(
-                own, training.joints[j], after.value, squares[:, j], rows[:, j], partial(_of_joint, made, j), criteria
-            )
+            differing = own is not None and _as_runs_differ(own, training.joints[j], after.value, left, criteria)
             if not differing:
                 why = f"{training.each[place].name} leaves {ratio:.2g} times the error of all others"
                 item = replace(item, shown=False, by="", why=why)
@@ -88,41 +90,58 @@ def _of_joint(made: Callable[[int], Array], joint: int, place: int) -> float:
     return float(made(place)[joint])
 
 
-def _loudest(
-    squares: Array, rows: Array, made: Callable[[int], float], criteria: SelectionCriteria
-) -> tuple[int, float] | None:
-    """Return the recording that leaves most beside all others, and how many times their rms, where that is much more.
+@dataclass(frozen=True, eq=False)
+class _Left:
+    """What each recording leaves of a joint.
 
-    Parameters
+    Attributes
     ----------
     squares, rows : ndarray, shape (recordings,)
-        Sum of squares that each leaves, of so many rows.
+        Sum of squares, of so many rows.
+    motions : ndarray of str, shape (recordings,)
+        The same for repetitions of one motion.
     made : callable
-        Returns the rms that the noise of the positions makes in one of them.
+        Returns the rms that the noise of the positions makes in a recording.
     """
-    from scipy.special import fdtrc
 
-    others = np.sum(rows) - rows
-    known = (rows > 0) & (others > 0)
-    level = np.where(known, np.sum(squares) - squares, 1.0) / np.maximum(others, 1)
-    ratio = np.divide(squares, rows * level, out=np.zeros(len(rows)), where=known & (level > 0.0))
-    place = int(np.argmax(ratio))
-    if ratio[place] <= criteria.worse_held_out**2:
-        return None
-    if len(rows) * float(fdtrc(rows[place], others[place], ratio[place])) >= criteria.significant:
-        return None
-    if squares[place] / rows[place] <= criteria.worse_held_out**2 * level[place] + made(place) ** 2:
-        return None
-    return place, float(np.sqrt(ratio[place]))
+    squares: Array
+    rows: Array
+    motions: NDArray[np.str_]
+    made: Callable[[int], float]
+
+    def loudest(self, criteria: SelectionCriteria) -> tuple[int, float] | None:
+        """Return the recording that leaves most beside all others, and how many times their rms, where that is much more."""
+        from scipy.special import fdtrc
+
+        apart = ~np.eye(len(self.rows), dtype=bool)
+        ratio, level = self._beside(apart)
+        others = apart @ self.rows
+        # No more than its own repetitions leave stands out.
+        again = apart & (self.motions[:, None] == self.motions)
+        repeated = again @ self.rows > 0
+        place = int(np.argmax(np.where(repeated, np.minimum(ratio, self._beside(again)[0]), ratio)))
+        worse = criteria.worse_held_out**2
+        if ratio[place] <= worse or (repeated[place] and self._beside(again)[0][place] <= worse):
+            return None
+        if len(self.rows) * float(fdtrc(self.rows[place], others[place], ratio[place])) >= criteria.significant:
+            return None
+        if self.squares[place] / self.rows[place] <= worse * level[place] + self.made(place) ** 2:
+            return None
+        return place, float(np.sqrt(ratio[place]))
+
+    def _beside(self, others: NDArray[np.bool_]) -> tuple[Array, Array]:
+        """Return the mean square of each recording as a ratio to that of others (recordings, recordings), and that; 0 where unknown."""
+        rows = others @ self.rows
+        level = np.divide(others @ self.squares, rows, out=np.zeros(len(rows)), where=rows > 0)
+        known = (self.rows > 0) & (level > 0.0)
+        return np.divide(self.squares, self.rows * level, out=np.zeros(len(rows)), where=known), level
 
 
 def _as_runs_differ(
     item: JointVariation,
     joint: JointRows,
     value: Array,
-    squares: Array,
-    rows: Array,
-    made: Callable[[int], float],
+    recordings: _Left,
     criteria: SelectionCriteria,
 ) -> bool:
     """Whether no run stands out by what is left without what runs differ by, nor by how far it lies off the others."""
@@ -136,7 +155,7 @@ def _as_runs_differ(
     of_run = list(zip(item.bounds[:-1], item.bounds[1:], strict=True))
     before, after = (np.array([np.sum(each[start:stop] ** 2) for start, stop in of_run]) for each in (left, rest))
     share = np.divide(after, before, out=np.ones(runs), where=before > 0.0)
-    if _loudest(share * squares, rows, made, criteria) is not None:
+    if replace(recordings, squares=share * recordings.squares).loudest(criteria) is not None:
         return False
     # A run of the same arm lies no further off the others' mean than they do: Student's t of one beside all others.
     off, unsure = item.of_run[:, item.std > 0.0], item.unsure[:, item.std > 0.0]

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scara_ident.diagnosis.even_evidence import LEAST_ALIKE, even_evidence
+from scara_ident.diagnosis.criteria import CRITERIA
+from scara_ident.diagnosis.even_evidence import LEAST_ALIKE, _Left, even_evidence
 from scara_ident.diagnosis.evidence import Evidence
 from scara_ident.estimation import wls
 from scara_ident.estimation.observations import Observations
@@ -37,6 +38,25 @@ def test_what_one_recording_leaves_more_of_than_all_others_is_no_noise():
     )
     # Of a single recording nothing is said.
     assert even_evidence(SHOWN, after, louder.of([2])) == SHOWN
+
+
+@pytest.mark.parametrize(
+    ("motions", "loud"),
+    [
+        # Noise that grows with the motion: both repetitions of one leave twice as much.
+        (["a", "a", "b", "b", "c"], None),
+        # The same of two motions.
+        (["a", "d", "b", "b", "c"], 0),
+        # One of two repetitions leaves more than the other.
+        (["b", "c", "a", "a", "d"], 0),
+    ],
+)
+def test_noise_that_a_motion_makes_each_time_is_no_recording_apart(motions: list[str], loud: int | None):
+    """An arm that lacks nothing was `undecided`, by noise that grows with its speed."""
+    rows = np.full(5, 400)
+    squares = rows * np.array([4.1, 4.0 if motions[1] != "c" else 1.0, 1.0, 1.0, 1.0])
+    found = _Left(squares, rows, np.array(motions), lambda place: 0.0).loudest(CRITERIA)
+    assert (None if found is None else found[0]) == loud
 
 
 def test_a_burst_of_noise_in_one_recording_is_no_recording_apart():
