@@ -220,6 +220,8 @@ def diagnose(
     if bands is not None:
         check_bands(robot, bands, (*recordings, *validation))
     base = model_of(model, robot)
+    if isinstance(catalogue, str):
+        raise ArgumentError(f"catalogue: expected effects; found a word: give effects_named({catalogue!r})")
     families = available_effects() if catalogue is None else tuple(catalogue)
     other = next((item for item in families if not isinstance(item, Effect)), None)
     if other is not None:

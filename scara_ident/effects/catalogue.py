@@ -22,6 +22,7 @@ from scara_ident.effects.recording_delays import DelayOfEachRecording
 from scara_ident.effects.shaft import CoupledShaft
 from scara_ident.effects.smooth_coulomb import SmoothCoulomb
 from scara_ident.effects.tilt import BaseTilt, NominalBaseTilt
+from scara_ident.errors import ArgumentError
 from scara_ident.registry import Registry
 
 CATALOGUE: tuple[Effect, ...] = (
@@ -102,7 +103,11 @@ def effects_named(*names: str) -> tuple[Effect, ...]:
     ------
     UsageError
         If there is none of a name.
+    ArgumentError
+        If one is no name.
     ScaraIdentError
         If a package's effect cannot be used; the line names the package.
     """
+    if other := [name for name in names if not isinstance(name, str)]:
+        raise ArgumentError(f"effects_named: expected names, one after the other; found {type(other[0]).__name__}")
     return tuple(chain.from_iterable(EFFECTS.get(name) for name in dict.fromkeys(names)))

@@ -12,7 +12,7 @@ import numpy as np
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.answerability import Inquiry, inquire
 from scara_ident.diagnosis.diagnose import Diagnosis
-from scara_ident.errors import ScaraIdentError, UsageError
+from scara_ident.errors import ArgumentError, ScaraIdentError, UsageError
 from scara_ident.estimation.information import Information, merge
 from scara_ident.excitation.criteria import Criterion, LogDet
 from scara_ident.excitation.curves import ExcitationTrajectory, Family, make_basis
@@ -192,6 +192,8 @@ def design_excitation(
         If a joint has no limits.
     UsageError
         If the arguments do not fit the model.
+    ArgumentError
+        If there is no model.
     ScaraIdentError
         If ``tell`` has no question.
 
@@ -211,6 +213,8 @@ def design_excitation(
     >>> write_trajectory(design.trajectories[0], "trajectory.csv")
     """
     begun = time.perf_counter()
+    if not isinstance(model, TorqueModel):
+        raise ArgumentError(f"model: expected a TorqueModel, as build_model gives; found {type(model).__name__}")
     robot, count = model.robot, len(model.names)
     durations = durations_of(duration, trajectories)
     trajectories, longest = len(durations), max(durations)

@@ -284,6 +284,8 @@ def check_bands(robot: Robot, bands: Sequence[float | None], recordings: Sequenc
     ------
     UsageError
     """
+    if not isinstance(bands, Sequence) and not isinstance(bands, np.ndarray):
+        raise ArgumentError(f"bands: expected one for each of {', '.join(robot.joints)}; found {type(bands).__name__}")
     if len(bands) != robot.n:
         raise UsageError(f"bands: {len(bands)} given; expected one for each of {', '.join(robot.joints)}")
     for joint, band in zip(robot.joints, bands, strict=True):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,11 +12,18 @@ from numpy.typing import ArrayLike
 
 from scara_ident.arrays import Array
 from scara_ident.errors import ArgumentError, RecordingError
+from scara_ident.recording.audit.samples import Finding
 from scara_ident.recording.recording import Recording, recording_of
 from scara_ident.robot.signal_map import contract_channels
 
 if TYPE_CHECKING:
     from scara_ident.robot.robot import Robot
+
+# What is said of arrays beside a description that maps columns: advice on that mapping would change nothing.
+AS_THEY_ARE = (
+    "arrays are taken in rad or m as they are: what the robot's description says under recording (scale, offset, columns) is for "
+    "files and data frames; change the arrays instead"
+)
 
 
 def read_arrays(
@@ -29,10 +37,13 @@ def read_arrays(
 ) -> Recording:
     """Make a recording of arrays and audit it, as `read_recording` does with a file.
 
+    What the robot's description says under ``recording`` (columns, units, scales, offsets) is for files and data frames. Arrays
+    are taken as they are, and where there is such a mapping a finding says so.
+
     Parameters
     ----------
     time : array_like, shape (N,)
-        In s.
+        In s; points in time (``datetime64``) count from the first.
     position : array_like, shape (N, n)
         In rad or m, a column for each of ``robot.joints``; (N,) will do for one joint.
     effort : array_like, shape (N, n), or None
@@ -64,7 +75,8 @@ def read_arrays(
     (2, 500)
     """
     check_robot(robot)
-    clock = _real(name, "time", time)
+    clock = np.asarray(time)
+    clock = _column(name, "time", clock) if clock.ndim == 1 and clock.dtype.kind in "mM" else _real(name, "time", time)
     if clock.ndim != 1:
         raise RecordingError(f"{name}: time has shape {clock.shape}; expected one number for each sample")
     columns = {"time": clock}
@@ -86,7 +98,10 @@ def read_arrays(
         return {column: columns[column].copy() for column in wanted}
 
     channels = contract_channels(robot.joints)
-    return recording_of(Path(name), tuple(columns), read, robot, channels, need_effort=effort is not None)
+    found = recording_of(Path(name), tuple(columns), read, robot, channels, need_effort=effort is not None)
+    if robot.channels in (None, channels):
+        return found
+    return replace(found, findings=(*found.findings, Finding("mapping", AS_THEY_ARE)))
 
 
 def read_frame(frame: Any, robot: Robot, *, name: str = "frame", need_effort: bool = True) -> Recording:
@@ -115,6 +130,8 @@ def read_frame(frame: Any, robot: Robot, *, name: str = "frame", need_effort: bo
         A column is missing or holds no numbers, or the audit refuses the samples.
     """
     check_robot(robot)
+    if hasattr(frame, "collect"):
+        raise ArgumentError(f"frame: a {type(frame).__name__}, whose rows are not there yet; give its collect()")
     if not (hasattr(frame, "columns") and hasattr(frame, "__getitem__")):
         raise ArgumentError(f"frame: expected a data frame of polars or pandas; found {type(frame).__name__}")
     channels = robot.channels or contract_channels(robot.joints)

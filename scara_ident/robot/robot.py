@@ -15,7 +15,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
-from scara_ident.errors import RobotError, UsageError
+from scara_ident.errors import ArgumentError, RobotError, UsageError
 from scara_ident.files import path_fault, real_path
 from scara_ident.manners import Frozen, several
 from scara_ident.robot.description import JointDescription, RobotDescription, read_description
@@ -196,6 +196,10 @@ def load_robot(path: Path | str | None = None) -> Robot:
     """
     if path is None:
         return build_robot(RobotDescription(urdf=embedded_urdf(), effort_side="motor"), embedded_urdf())
+    if not isinstance(path, (str, Path)):
+        raise ArgumentError(
+            f"path: expected that of a robot.yaml or a URDF, or a robot's name; found {type(path).__name__}"
+        )
     source = Path(path)
     if (fault := path_fault(source)) is not None:
         raise RobotError(fault)

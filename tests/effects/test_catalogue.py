@@ -9,7 +9,7 @@ import pytest
 
 import scara_ident
 from scara_ident.effects import CATALOGUE, EFFECTS, available_effects, effects_named
-from scara_ident.errors import PluginWarning, ScaraIdentError, UsageError
+from scara_ident.errors import ArgumentError, PluginWarning, ScaraIdentError, UsageError
 from tests.plugins.made import make_installed
 
 SOURCE = """
@@ -96,3 +96,8 @@ def test_report_and_diagnosis_name_no_effect_and_import_no_family():
 def test_no_joint_silently_becomes_the_first():
     found = [file for file, text in sources("").items() if re.search(r"\b(joint|partner|place) or 0\b", text)]
     assert found == []
+
+
+def test_what_is_no_name_is_refused_as_a_type():
+    with pytest.raises(ArgumentError, match="expected names, one after the other; found list"):
+        effects_named(["spring"])  # type: ignore[arg-type]

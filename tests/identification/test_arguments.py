@@ -11,6 +11,7 @@ import pytest
 
 from scara_ident.diagnosis import diagnose
 from scara_ident.errors import ArgumentError, RecordingError
+from scara_ident.excitation import design_excitation
 from scara_ident.identification.arguments import model_of, recordings_of
 from scara_ident.identification.compare import compare
 from scara_ident.identification.identify import identify
@@ -71,6 +72,14 @@ def test_arguments_in_the_wrong_place_are_named(robot: Robot, run: Recording):
         identify([run], robot)
     with pytest.raises(ArgumentError, match="validation: expected recordings"):
         identify(robot, [run], validation=[3])
+    with pytest.raises(ArgumentError, match="bands: expected one for each of joint1, joint2; found float"):
+        identify(robot, [run], bands=5.0)
+    with pytest.raises(ArgumentError, match=r"found a word: give effects_named\('spring'\)"):
+        diagnose(robot, [run], catalogue="spring")
+    with pytest.raises(ArgumentError, match="expected a TorqueModel, as build_model gives; found str"):
+        design_excitation("panda")
+    with pytest.raises(ArgumentError, match=r"expected that of a robot.yaml or a URDF, or a robot's name; found dict"):
+        load_robot({"urdf": "arm.urdf"})
     with pytest.raises(
         ArgumentError, match="model: expected a name or a TorqueModel, as build_model gives; found NoneType"
     ):

@@ -33,6 +33,21 @@ def test_arrays_give_what_the_file_gives(robot: Robot, tmp_path: Path):
     assert read_arrays(TIME, POSITION, None, robot).effort is None
 
 
+def test_of_arrays_a_mapping_is_said_to_change_nothing(robot: Robot, tmp_path: Path):
+    """What a note advised to write under ``recording`` was followed to the letter, and given again."""
+    mapped = described(tmp_path, "{position: {offset: {joint2: -1.5708}}}")
+    found = read_arrays(TIME, POSITION, EFFORT, mapped)
+    np.testing.assert_array_equal(found.position, POSITION.T)
+    (said,) = (item.message for item in found.findings if item.kind == "mapping")
+    assert "change the arrays instead" in said
+    assert not [item for item in read_arrays(TIME, POSITION, EFFORT, robot).findings if item.kind == "mapping"]
+
+
+def test_points_in_time_count_from_the_first(robot: Robot):
+    stamps = np.datetime64("2026-03-01T10:00") + (1e6 * TIME).round().astype("timedelta64[us]")
+    np.testing.assert_allclose(read_arrays(stamps, POSITION, EFFORT, robot).time, TIME - TIME[0], atol=1e-9)
+
+
 @pytest.mark.parametrize("make", [pl.DataFrame, pd.DataFrame])
 def test_frames_go_through_the_robots_mapping(tmp_path: Path, make: Callable[[Any], Any]):
     mapped = described(tmp_path, "{time: {column: t, unit: ms}, position: {column: 'q{number}', unit: deg}}")
@@ -72,6 +87,11 @@ def test_the_index_of_pandas_is_the_time_where_no_column_is(robot: Robot):
 def test_what_arrays_lack_is_said(robot: Robot, arguments, error, said: str):
     with pytest.raises(error, match=said):
         read_arrays(*arguments, robot)
+
+
+def test_a_lazy_frame_is_to_be_collected(robot: Robot):
+    with pytest.raises(ArgumentError, match=r"a LazyFrame, whose rows are not there yet; give its collect\(\)"):
+        read_frame(pl.DataFrame(MADE).lazy(), robot)
 
 
 @pytest.mark.parametrize("frame", [{"time": TIME}, POSITION, "run.csv", None])
