@@ -49,8 +49,9 @@ class OnlineSettings:
     memory : float
         s after which what is old weighs 1/e, while the motion excites.
     dependent : float
-        Samples that one independent sample stands for: 1 for white noise; of a signal low-passed at B Hz
-        ``rate / (2.5 B)``.
+        Samples that one independent sample stands for: 1 for white noise; of noise that passed a filter ``rate / (2 b)`` with
+        its noise bandwidth b, which is the integral of its squared gain over frequency, Hz: of a Butterworth filter of order n at B Hz
+        ``B x / sin(x)`` with ``x = pi / (2 n)``, of one of order 2 run both ways 0.83 B.
     false_alarms : float
         Of the detector, per hour of motion.
     window : float
