@@ -29,6 +29,7 @@ from scara_ident.diagnosis.candidates import CandidateColumns, columns_at_hand
 from scara_ident.diagnosis.correction import corrected
 from scara_ident.diagnosis.search import Search
 from scara_ident.diagnosis.selection_step import SelectionStep, observed
+from scara_ident.errors import RecordingError
 from scara_ident.estimation.least_squares import value_and_weights
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.motion.prepared import PreparedData, prepare
@@ -52,16 +53,25 @@ def rows_on(step: SelectionStep, found: Search, data: PreparedData) -> Observati
     return observed(replace(step, scene=scene, columns=CandidateColumns(rows)))
 
 
-def errors(step: SelectionStep, found: Search, each: list[PreparedData]) -> np.ndarray:
+def errors(step: SelectionStep, found: Search, each: Sequence[PreparedData]) -> np.ndarray:
     """Return the rms error of every joint on every recording, shape (recordings, n); NaN without rows."""
     value, _ = value_and_weights(observed(step))
     rows = [rows_on(step, found, data).by_joint for data in each]
     return np.array([[item.rms(value) if item.rows else np.nan for item in joints] for joints in rows])
 
 
-def counts(found: Search, each: list[PreparedData]) -> np.ndarray:
+def counts(found: Search, each: Sequence[PreparedData]) -> np.ndarray:
     """Return the rows of every joint on every recording, shape (recordings, n)."""
     return np.array([[item.rows for item in observe(found.base, data).by_joint] for data in each])
+
+
+def says_something(found: Search, data: PreparedData) -> bool:
+    """Return whether a recording has rows, as one has not whose joints all rest or are held."""
+    try:
+        observe(found.base, data)
+    except RecordingError:
+        return False
+    return True
 
 
 def direction(arm: Path, model: str, training: Sequence[Recording], others: Sequence[Recording]) -> dict[str, Any]:
@@ -70,7 +80,8 @@ def direction(arm: Path, model: str, training: Sequence[Recording], others: Sequ
     robot = load_robot(arm / "robot.yaml")
     diagnosis = diagnose(robot, training, model=model, validation=validation)
     found = diagnosis.search
-    each = [prepare([item]).at(found.bands) for item in unseen]
+    prepared = ((item, prepare([item]).at(found.bands)) for item in unseen)
+    unseen, each = zip(*(pair for pair in prepared if says_something(found, pair[1])), strict=True)
     whole, rows = errors(found.step, found, each), counts(found, each)
     base = errors(replace(found.step, chosen=()), found, each)
     joints = list(robot.joints)

@@ -32,6 +32,8 @@ BINS = 12
 UNTOUCHED = 0.8
 # Noise of the positions by one draw that has more of the residual's power than this is not what it was taken for.
 MOST_KNOWN = 1.5
+# Probability below which what repeats is doubted to be noise where it is `far_above_noise`: nothing is claimed by it.
+DOUBTED = 0.05
 
 
 @dataclass(frozen=True)
@@ -156,7 +158,13 @@ def _of_joint(
     if fit is not None and fit.most_missing <= criteria.remainder_to_noise * fit.noise:
         why = f"repetitions leave at most {fit.most_missing:.3g} {unit} that repeats, and {fit.noise:.3g} {unit} that does not"
         return Evidence(joint, True, "repetition", why, limit)
-    if fit is not None and repeats and fit.missing > max(of_effects * fit.noise, max(1.0, of_effects) * of_positions):
+    # What is that large beside the noise is doubted where it is hardly shown too, as of a few periods of a narrow band.
+    far = fit is not None and fit.p_value < DOUBTED and fit.missing > criteria.far_above_noise * fit.noise
+    if (
+        fit is not None
+        and (repeats or far)
+        and fit.missing > max(of_effects * fit.noise, max(1.0, of_effects) * of_positions)
+    ):
         # A ripple at many speeds is as white as noise, and repeats.
         why = f"{_beside(fit, unit)}: no noise, even where it is white, but filters and encoders may leave as much, "
         why += "so this alone does not say that the model lacks something"

@@ -12,6 +12,7 @@ from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.diagnose import diagnose
 from scara_ident.diagnosis.evidence import (
     Evidence,
+    _of_joint,
     coloured_shares,
     evidence,
     held_out_evidence,
@@ -191,3 +192,13 @@ def test_the_noise_of_positions_speaks_of_the_joints_alone_that_it_colours(nothi
     assert [item.shown for item in without] == [False, True]
     assert [item.shown for item in within] == [True, True]
     assert "that of the positions" in within[0].why and within[1] == without[1]
+
+
+@pytest.mark.parametrize(
+    ("p_value", "missing", "shown"), [(0.0138, 0.0227, False), (0.0138, 0.0100, True), (0.2, 0.0227, True)]
+)
+def test_what_is_far_above_the_noise_is_doubted_where_it_is_hardly_shown_to_repeat(p_value, missing, shown):
+    """A gear of ten times the stiffness was `explained` beside 5.5 times the noise, with p = 1.4 % of few periods."""
+    fit = LackOfFit("joint1", 0.00413, missing, 2.0 * missing, p_value, ())
+    told = _of_joint("joint1", "N m", fit, 0.05, "white noise", 0.05, (0.03, 0.0, CRITERIA.far_above_noise), CRITERIA)
+    assert told.shown == shown and told.by == ("whiteness" if shown else "repetition")
