@@ -128,8 +128,17 @@ def observed_exchanged(held: Observations, signal: Signal, joints: tuple[int, in
         torque = part.torque[order] if "effort" in signal else part.torque
         if "position" not in signal:
             return part.with_torque_of(replace(part.stretch, torque=torque, _thinned={}))
-        position = part.stretch.position[order]
-        stretch = replace(part.stretch, position=position, torque=torque, _filtered={}, _thinned={})
+        own = part.stretch
+        stretch = replace(
+            own,
+            position=own.position[order],
+            torque=torque,
+            # What is known of positions goes with them.
+            idle=own.idle if isinstance(own.idle, bool) else own.idle[order],
+            steps=tuple(own.steps[k] for k in order) if own.steps else (),
+            _filtered={},
+            _thinned={},
+        )
         return PreparedStretch(stretch, part.bands)
 
     data = _changed(held.data, read)

@@ -17,6 +17,7 @@ from scara_ident.identification.channel_reading import (
     turned,
     with_joint,
 )
+from scara_ident.recording.audit import Finding
 from scara_ident.recording.recording import Recording
 from tests.identification.turned_arm import arm, runs, seen
 
@@ -72,3 +73,19 @@ def test_exchanged_signals_are_those_of_exchanged_columns(signal: str) -> None:
     found = observed_exchanged(seen(robot, wrong), signal, (1, 3))
     for one, other in zip(found.joints, seen(robot, items).joints, strict=True):
         assert np.max(np.abs(one.table - other.table)) < 1e-9 * np.max(np.abs(other.table))
+
+
+def test_a_joint_that_is_held_is_exchanged_with_its_positions() -> None:
+    """Rows of the other joint were left out in its place, and nothing was left of a recording."""
+    robot = arm()
+    items = runs(robot, (0,) * 4)
+
+    def held(joint: int, order: list[int]) -> list[Recording]:
+        still = Finding("idle_joint", "", idle=(joint,))
+        return [replace(item, position=item.position[order], findings=(still,)) for item in items]
+
+    wrong, right = held(1, [0, 3, 2, 1]), held(3, [0, 1, 2, 3])
+    found = observed_exchanged(seen(robot, wrong), "position", (1, 3))
+    rows = [item.table.shape[1] for item in found.joints]
+    assert rows == [item.table.shape[1] for item in seen(robot, right).joints]
+    assert rows[3] == 0 < rows[1]

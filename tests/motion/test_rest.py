@@ -222,3 +222,13 @@ def test_a_joint_that_is_held_between_two_gaps_is_at_rest_there():
     still = replace(scara_run(0, held_since=6.0), cuts=(1500,))
     first, second = prepare([still]).at((10.0, 10.0)).recordings[0].stretches
     assert np.mean(first.used[1]) > 0.5 and not np.any(second.used[1])
+
+
+def test_an_arm_of_which_a_joint_is_held_in_all_recordings_is_identified_without_it():
+    runs = [scara_run(seed, held_since=0.0) for seed in (1, 2)]
+    for method in ("wls", "consistent"):
+        found = identify(load_robot(), runs, method=method)
+        names = found.estimate.model.names
+        coulomb = names.index("a01")
+        assert abs(found.estimate.value[coulomb] - COULOMB[0]) < 4.0 * found.estimate.std[coulomb]
+        assert found.estimate.undetermined[names.index("a02")]

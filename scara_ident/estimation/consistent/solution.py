@@ -224,7 +224,8 @@ def nearest_arm(
     size = np.linalg.norm(factor, axis=0)
     size[size == 0.0] = 1.0
     _, singular, right = np.linalg.svd(factor / size)
-    determined = right[singular > UNDETERMINED * singular[0]] * size
+    # Fewer rows than parameters leave fewer singular values.
+    determined = right[: len(singular)][singular > UNDETERMINED * singular[0]] * size
     rows = [determined @ u.to_parameters[u.place, u.rigid], u.held[:, u.rigid]]
     if standard_prior is not None:
         rows.append(standard_prior.rows @ u.nominal.to_standard)
