@@ -70,6 +70,8 @@ BLOCKS = (CONFIRMED, ("position", "effort"))
 _NAMELESS = re.compile("column_[0-9]+")
 # Units that their capitals tell from other words.
 _CAPITALS = re.compile(r"(?:^|[_ .])(mA|A|mNm|Nm|N)(?=$|[_ .\[])")
+# What German writes where umlauts cannot be written; accents of other languages are left out there.
+_UMLAUTS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "Ä": "AE", "Ö": "OE", "Ü": "UE"})
 
 
 @dataclass(frozen=True)
@@ -119,7 +121,7 @@ def meaning(name: str, joints: Sequence[str] = ()) -> Meaning:
     """
     tokens = list(_TOKEN.finditer(_without_accents(name)))
     words = [token[0].lower() for token in tokens]
-    joint, span = _joint(words, joints)
+    joint, span = _joint([_spellings(name[token.start() : token.end()]) for token in tokens], joints)
     rest = [k for k in range(len(words)) if span is None or not span[0] <= k < span[1]]
     numbers = [k for k in rest if words[k].isdigit() and len(words[k]) <= MOST_DIGITS]
     spoken = [part for k in rest for part in _parts(words[k])]
@@ -160,7 +162,17 @@ def meaning(name: str, joints: Sequence[str] = ()) -> Meaning:
 
 def _without_accents(text: str) -> str:
     """Return a text of the same length without accents."""
-    return "".join(unicodedata.normalize("NFKD", letter)[0] for letter in text)
+    return "".join("s" if letter == "ß" else unicodedata.normalize("NFKD", letter)[0] for letter in text)
+
+
+def _spellings(text: str) -> frozenset[str]:
+    """Return a text in small letters as it is written without accents, and without umlauts."""
+    return frozenset(map(_plain, (text, text.translate(_UMLAUTS))))
+
+
+def _plain(text: str) -> str:
+    letters = unicodedata.normalize("NFKD", text.casefold())
+    return "".join(letter for letter in letters if not unicodedata.combining(letter))
 
 
 def _without_unit(template: str) -> str:
@@ -193,20 +205,29 @@ def _unit(name: str, words: Sequence[str], quantity: str) -> str | None:
     return None
 
 
-def _joint(words: Sequence[str], joints: Sequence[str]) -> tuple[int | None, tuple[int, int] | None]:
-    """Find the joint that a name contains, by its longest form, and the words that it takes."""
+def _joint(words: Sequence[frozenset[str]], joints: Sequence[str]) -> tuple[int | None, tuple[int, int] | None]:
+    """Find the joint that a name contains, by its longest form, and the words that it takes, each in its spellings."""
     best: tuple[int, int, tuple[int, int]] | None = None
     for index, forms in enumerate(_forms(joints)):
         for form in forms:
             for start in range(len(words) - len(form) + 1):
-                if tuple(words[start : start + len(form)]) == form and (best is None or len(form) > best[0]):
+                spelled = words[start : start + len(form)]
+                if all(map(frozenset.__contains__, spelled, form)) and (best is None or len(form) > best[0]):
                     best = (len(form), index, (start, start + len(form)))
     return (None, None) if best is None else (best[1], best[2])
 
 
 def _forms(joints: Sequence[str]) -> list[list[tuple[str, ...]]]:
     """List for every joint the words by which a logger may call it; no form stands for two joints."""
-    full = [tuple(token[0].lower() for token in _TOKEN.finditer(joint)) for joint in joints]
+    spelled = [joints, [joint.translate(_UMLAUTS) for joint in joints]]
+    forms = [list(dict.fromkeys(each)) for each in map(list.__add__, *map(_every_form, spelled))]
+    every = [form for mine in forms for form in mine]
+    return [[form for form in mine if every.count(form) == 1] for mine in forms]
+
+
+def _every_form(joints: Sequence[str]) -> list[list[tuple[str, ...]]]:
+    plain = [_without_accents(joint.replace("ß", "ss")) for joint in joints]
+    full = [tuple(token[0].lower() for token in _TOKEN.finditer(joint)) for joint in plain]
     shared = 0
     while len(full) > 1 and all(len(words) > shared + 1 and words[shared] == full[0][shared] for words in full):
         shared += 1
@@ -219,8 +240,7 @@ def _forms(joints: Sequence[str]) -> list[list[tuple[str, ...]]]:
             if shorter not in mine and any(not word.isdigit() and word not in _WORDS for word in shorter):
                 mine.append(shorter)
         forms.append(mine)
-    every = [form for mine in forms for form in mine]
-    return [[form for form in mine if every.count(form) == 1] for mine in forms]
+    return forms
 
 
 def meanings_by_place(numbers: Mapping[str, Array], counts: Sequence[int]) -> dict[str, Meaning]:

@@ -62,6 +62,27 @@ def test_a_prefix_of_all_joints_may_be_left_out_and_ambiguous_short_names_count_
 
 
 @pytest.mark.parametrize(
+    ("name", "joint"),
+    [
+        ("Säule Istposition [°]", 0),
+        ("Rucken Istposition", 3),
+        ("SÄULE_POS", 0),
+        ("Saeule.position", 0),
+        ("Fußgelenk Winkel", 1),
+        ("épaule position", 2),
+        ("EpaulePosition", 2),
+        ("Ruecken pos", 3),
+        ("Rücken pos", 3),
+        ("Hubsäule pos", None),
+    ],
+)
+def test_umlauts_and_accents_may_be_written_out_in_the_column_or_in_the_urdf(name, joint):
+    said = meaning(name, ("saeule", "fussgelenk", "epaule", "rücken"))
+    assert said.joint == joint
+    assert joint is None or said.template.startswith("{joint}")
+
+
+@pytest.mark.parametrize(
     ("name", "commanded", "measured"),
     [
         ("Sollposition A1", True, False),
