@@ -16,10 +16,10 @@ from scara_ident.robot.units import ALSO, find_unit, is_unit, table_of
 
 QUANTITIES = {
     "position": "position positions pos q jpos qpos angle angles ang theta encoder enc winkel drehwinkel lage",
-    "velocity": "velocity velocities vel qd dq qdot qvel speed speeds omega geschwindigkeit winkelgeschwindigkeit drehzahl "
+    "velocity": "velocity velocities vel qd dq qdot qvel speed speeds spd omega geschwindigkeit winkelgeschwindigkeit drehzahl "
     "vitesse vitesses",
     "acceleration": "acceleration accelerations acc accel qdd ddq qddot beschleunigung winkelbeschleunigung",
-    "effort": "effort efforts torque torques trq tau current currents curr moment moments force forces drehmoment kraft "
+    "effort": "effort efforts torque torques trq tau current currents curr cur amp amps moment moments force forces drehmoment kraft "
     "strom couple couples courant courants",
     "temperature": "temperature temperatures temp temps temperatur",
     "time": "time times t timestamp timestamps stamp clock date datetime zeit zeitstempel uhrzeit temps heure horodatage",
@@ -28,16 +28,17 @@ QUANTITIES = {
 
 # The French word for time is also the plural of a short temperature; of the arm, not of a joint, it is the time.
 _BOTH = "temps"
-# What German puts before such words: is and shall, and whose.
-_PREFIXES = ("ist", "soll", "gelenk", "achsen", "achs", "motor")
+# What German and short names put before such words: is and shall, and whose.
+_PREFIXES = ("ist", "soll", "akt", "act", "gelenk", "achsen", "achs", "motor")
 _WORDS = {word: quantity for quantity, words in QUANTITIES.items() for word in words.split()} | {_BOTH: "temperature"}
 COMMANDED = frozenset(
     ["target", "desired", "des", "command", "commanded", "cmd", "ref", "reference", "setpoint", "goal", "planned",
      "soll", "sollwert", "vorgabe", "consigne", "commande", "cible"]
 )  # fmt: skip
 MEASURED = frozenset(
-    ["actual", "act", "measured", "meas", "feedback", "fb", "sensor", "ist", "gemessen", "mesure", "mesuree", "reel"]
-)
+    ["actual", "act", "measured", "meas", "feedback", "fb", "sensor", "ist", "akt", "aktuell", "gemessen", "mesure",
+     "mesuree", "reel"]
+)  # fmt: skip
 # Of such columns no channel of a joint is made.
 OTHER = frozenset(
     ["error", "err", "std", "min", "max", "limit", "limits", "tcp", "tool", "cartesian", "pose", "gripper", "imu",
@@ -46,7 +47,11 @@ OTHER = frozenset(
 # Of an encoder behind the gear, where there is another one before it.
 LINK_SIDE = frozenset(("link", "load", "output", "secondary", "second", "se", "abtrieb", "abtriebsseitig"))
 GENERIC = frozenset(("joint", "link", "axis", "motor", "gelenk", "achse", "axe", "articulation", "moteur"))
-CURRENT = frozenset(("current", "currents", "curr", "i", "strom", "courant", "courants"))
+CURRENT = frozenset(("current", "currents", "curr", "cur", "amp", "amps", "i", "strom", "courant", "courants"))
+# Such a word says that a value is of now where it stands before a quantity; before a letter, as in current_t, it is one.
+_OF_NOW = frozenset(("current", "curr", "cur"))
+# An amplifier, unless what was measured or asked for is so many of its unit.
+_AMPLIFIER = "amp"
 TORQUE = frozenset(
     ["torque", "torques", "trq", "tau", "moment", "moments", "force", "forces", "drehmoment", "kraft", "couple",
      "couples"]
@@ -124,7 +129,7 @@ def meaning(name: str, joints: Sequence[str] = ()) -> Meaning:
     joint, span = _joint([_spellings(name[token.start() : token.end()]) for token in tokens], joints)
     rest = [k for k in range(len(words)) if span is None or not span[0] <= k < span[1]]
     numbers = [k for k in rest if words[k].isdigit() and len(words[k]) <= MOST_DIGITS]
-    spoken = [part for k in rest for part in _parts(words[k])]
+    spoken = _spoken([words[k] for k in rest])
     template, number = name, None
     if span is not None:
         template = f"{name[: tokens[span[0]].start()]}{{joint}}{name[tokens[span[1] - 1].end() :]}"
@@ -189,6 +194,18 @@ def _parts(word: str) -> list[str]:
         if word not in _WORDS and word.removeprefix(prefix) in _WORDS and word != prefix:
             return [prefix, word.removeprefix(prefix)]
     return [word]
+
+
+def _spoken(words: Sequence[str]) -> list[str]:
+    """Return the words of a name, without what is no quantity beside the next or the last one."""
+    parts = [part for word in words for part in _parts(word)]
+    beside = zip(["", *parts], parts, [*parts[1:], ""], strict=False)
+    return [
+        word
+        for before, word, behind in beside
+        if not (word in _OF_NOW and behind in _WORDS and len(behind) > 1)
+        and not (word == _AMPLIFIER and before not in MEASURED | COMMANDED)
+    ]
 
 
 def _unit(name: str, words: Sequence[str], quantity: str) -> str | None:
