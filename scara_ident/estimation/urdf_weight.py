@@ -29,6 +29,9 @@ from scara_ident.robot.robot import Robot
 # Weight and inertia are compared where each makes at least this share of the URDF's torque: what is smaller is mostly what
 # the bodies' shapes make of it.
 SHARE = 0.02
+# A weight that is off by less than this share of the torque on the joint that bears most is what centres of mass a few cm off
+# make of a wrist.
+HEAVY = 0.1
 # Inertia up to this multiple of the URDF's is that of its bodies: what balances them moves with them, and doubles it or so.
 HEAVIEST = 3.0
 # Samples that are looked at; the torque of bodies is smooth.
@@ -66,16 +69,21 @@ def otherwise_loaded(estimate: Estimate, observations: Observations) -> dict[str
     known = np.isfinite(stated) & ~estimate.undetermined[place] & np.isfinite(std)
     covariance = estimate.covariance[place, place]
     moving, still = _columns(observations)
-    slight = slight_joints(estimate, observations)
+    units = [robot.torque_unit(j) for j in range(robot.n)]
+    places = [np.flatnonzero(pattern) for pattern in rigid.pattern]
+    borne = [
+        float(np.linalg.norm(stated[own][known[own]] @ rows[known[own]]))
+        for own, rows in zip(places, moving, strict=True)
+    ]
     found = {}
     for j, joint in enumerate(robot.joints):
-        own = np.flatnonzero(rigid.pattern[j])
-        use = known[own]
-        own, weight = own[use], still[j][use]
+        use = known[places[j]]
+        own, weight = places[j][use], still[j][use]
         inertia = moving[j][use] - weight
         parts = [stated[own] @ part for part in (weight, inertia)]
-        total = np.linalg.norm(parts[0] + parts[1])
-        if joint in slight or not min(map(np.linalg.norm, parts)) > SHARE * total:
+        most = max(size for size, unit in zip(borne, units, strict=True) if unit == units[j])
+        off = np.linalg.norm((value[own] - stated[own]) @ weight)
+        if not (min(map(np.linalg.norm, parts)) > SHARE * borne[j] and off > HEAVY * most):
             continue
         shares = [columns @ part / (part @ part) for columns, part in zip((weight, inertia), parts, strict=True)]
         heavy, inert = (float(share @ value[own]) for share in shares)

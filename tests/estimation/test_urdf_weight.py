@@ -101,3 +101,20 @@ def test_on_a_joint_that_turns_a_centre_of_mass_may_lie_elsewhere(tmp_path):
     said = told_scale(*seen(robot, (-0.7 * weight, 0.0)))
     assert "times the URDF's on j1, which no effort_gain makes" in said
     assert said.endswith("or a payload, or has a centre of mass elsewhere.")
+
+
+def test_a_centre_of_mass_a_little_off_on_a_wrist_is_no_counterweight(tmp_path, monkeypatch):
+    """UR5s whose centres of mass were 1.5 cm off were said to lack one at the first wrist joint."""
+    near = Link(axis=(0.0, 1.0, 0.0), xyz=(0.4, 0.0, 0.0), mass=0.5, com=(0.02, 0.0, 0.0))
+    other = replace(near, com=(0.06, 0.0, 0.0))
+    (tmp_path / "robot.yaml").write_text(
+        "urdf: arm.urdf\neffort_side: joint\njoints:\n  j1: {rotor_inertia: 0.1}\n  j2: {rotor_inertia: 0.01}\n"
+    )
+    write_urdf(tmp_path / "arm.urdf", (PLANAR_2R[0], other))
+    run = swing(load_robot(tmp_path / "robot.yaml"), seconds=SECONDS, rate=RATE)
+    write_urdf(tmp_path / "arm.urdf", (PLANAR_2R[0], near))
+    observations = observe(build_model(load_robot(tmp_path / "robot.yaml"), "basic"), prepare([run], (8.0, 8.0)))
+    found = wls(observations), observations
+    assert otherwise_loaded(*found) == {}
+    monkeypatch.setattr("scara_ident.estimation.urdf_weight.HEAVY", 0.0)
+    assert list(otherwise_loaded(*found)) == ["j2"]
