@@ -119,15 +119,6 @@ def slight_joints(estimate: Estimate, observations: Observations) -> tuple[str, 
     return tuple(joint for joint, own in each.items() if max(own.torque, own.nominal) < SLIGHT * most[units[joint]])
 
 
-def told_scale(estimate: Estimate, observations: Observations) -> str:
-    """Say how the scale of the identified bodies compares with the URDF's."""
-    seen = estimate, observations
-    scales = urdf_scale(*seen)
-    return scale_sentence(
-        scales, observations.model.robot, unlike_urdf(*seen), slight_joints(*seen), braked_joints(estimate)
-    )
-
-
 def braked_joints(estimate: Estimate) -> tuple[str, ...]:
     """Return the joints whose Coulomb friction surely brakes: there efforts have the sign of the positions."""
     model, found = estimate.model, []

@@ -66,12 +66,15 @@ def clearance_of(
     except RobotError as error:
         return replace(watched, notes=(unwatched.format(error),))
     moved = [shape.parentJoint for shape in shapes.geometryObjects]
-    if not any(moved):
-        return replace(watched, notes=(unwatched.format(f"{robot.urdf.name} has no collision shapes"),))
     bare = bare_links(robot)
-    notes = (f"Links without a collision shape are not watched: {', '.join(bare)}.",) if bare else ()
     obstacles = [*(["floor"] if np.isfinite(floor) else []), *(f"box{k + 1}" for k in range(len(boxes)))]
     count, found = shapes.ngeoms - len(obstacles), shapes.geometryObjects
+    if not any(moved):
+        lacks = f"{robot.urdf.name} has no collision shapes"
+        if count:
+            lacks += " on the links that move" + (f" ({', '.join(bare)})" if bare else "")
+        return replace(watched, notes=(unwatched.format(lacks),))
+    notes = (f"Links without a collision shape are not watched: {', '.join(bare)}.",) if bare else ()
     pairs = [
         (i, j, "self")
         for i in range(count)
@@ -82,7 +85,7 @@ def clearance_of(
     ]
     pairs += [(i, count + k, name) for k, name in enumerate(obstacles) for i in range(count) if moved[i]]
     if not pairs:
-        return replace(watched, notes=(unwatched.format("all links that have shapes hang on one another"),))
+        return replace(watched, notes=(unwatched.format("all links that have shapes hang on one another"), *notes))
     return _parted(replace(watched, pairs=tuple(pairs), notes=notes), lower, upper)
 
 

@@ -16,10 +16,10 @@ from scara_ident.robot.units import ALSO, find_unit, is_unit, table_of
 
 QUANTITIES = {
     "position": "position positions pos q jpos qpos angle angles ang theta encoder enc winkel drehwinkel lage",
-    "velocity": "velocity velocities vel qd dq qdot qvel speed speeds omega geschwindigkeit winkelgeschwindigkeit drehzahl "
+    "velocity": "velocity velocities vel qd dq qdot qvel speed speeds spd omega geschwindigkeit winkelgeschwindigkeit drehzahl "
     "vitesse vitesses",
     "acceleration": "acceleration accelerations acc accel qdd ddq qddot beschleunigung winkelbeschleunigung",
-    "effort": "effort efforts torque torques trq tau current currents curr moment moments force forces drehmoment kraft "
+    "effort": "effort efforts torque torques trq tau current currents curr cur amp amps moment moments force forces drehmoment kraft "
     "strom couple couples courant courants",
     "temperature": "temperature temperatures temp temps temperatur",
     "time": "time times t timestamp timestamps stamp clock date datetime zeit zeitstempel uhrzeit temps heure horodatage",
@@ -28,16 +28,17 @@ QUANTITIES = {
 
 # The French word for time is also the plural of a short temperature; of the arm, not of a joint, it is the time.
 _BOTH = "temps"
-# What German puts before such words: is and shall, and whose.
-_PREFIXES = ("ist", "soll", "gelenk", "achsen", "achs", "motor")
+# What German and short names put before such words: is and shall, and whose.
+_PREFIXES = ("ist", "soll", "akt", "act", "gelenk", "achsen", "achs", "motor")
 _WORDS = {word: quantity for quantity, words in QUANTITIES.items() for word in words.split()} | {_BOTH: "temperature"}
 COMMANDED = frozenset(
     ["target", "desired", "des", "command", "commanded", "cmd", "ref", "reference", "setpoint", "goal", "planned",
      "soll", "sollwert", "vorgabe", "consigne", "commande", "cible"]
 )  # fmt: skip
 MEASURED = frozenset(
-    ["actual", "act", "measured", "meas", "feedback", "fb", "sensor", "ist", "gemessen", "mesure", "mesuree", "reel"]
-)
+    ["actual", "act", "measured", "meas", "feedback", "fb", "sensor", "ist", "akt", "aktuell", "gemessen", "mesure",
+     "mesuree", "reel"]
+)  # fmt: skip
 # Of such columns no channel of a joint is made.
 OTHER = frozenset(
     ["error", "err", "std", "min", "max", "limit", "limits", "tcp", "tool", "cartesian", "pose", "gripper", "imu",
@@ -46,7 +47,11 @@ OTHER = frozenset(
 # Of an encoder behind the gear, where there is another one before it.
 LINK_SIDE = frozenset(("link", "load", "output", "secondary", "second", "se", "abtrieb", "abtriebsseitig"))
 GENERIC = frozenset(("joint", "link", "axis", "motor", "gelenk", "achse", "axe", "articulation", "moteur"))
-CURRENT = frozenset(("current", "currents", "curr", "i", "strom", "courant", "courants"))
+CURRENT = frozenset(("current", "currents", "curr", "cur", "amp", "amps", "i", "strom", "courant", "courants"))
+# Such a word says that a value is of now where it stands before a quantity; before a letter, as in current_t, it is one.
+_OF_NOW = frozenset(("current", "curr", "cur"))
+# An amplifier, unless what was measured or asked for is so many of its unit.
+_AMPLIFIER = "amp"
 TORQUE = frozenset(
     ["torque", "torques", "trq", "tau", "moment", "moments", "force", "forces", "drehmoment", "kraft", "couple",
      "couples"]
@@ -70,6 +75,8 @@ BLOCKS = (CONFIRMED, ("position", "effort"))
 _NAMELESS = re.compile("column_[0-9]+")
 # Units that their capitals tell from other words.
 _CAPITALS = re.compile(r"(?:^|[_ .])(mA|A|mNm|Nm|N)(?=$|[_ .\[])")
+# What German writes where umlauts cannot be written; accents of other languages are left out there.
+_UMLAUTS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "Ä": "AE", "Ö": "OE", "Ü": "UE"})
 
 
 @dataclass(frozen=True)
@@ -119,10 +126,10 @@ def meaning(name: str, joints: Sequence[str] = ()) -> Meaning:
     """
     tokens = list(_TOKEN.finditer(_without_accents(name)))
     words = [token[0].lower() for token in tokens]
-    joint, span = _joint(words, joints)
+    joint, span = _joint([_spellings(name[token.start() : token.end()]) for token in tokens], joints)
     rest = [k for k in range(len(words)) if span is None or not span[0] <= k < span[1]]
     numbers = [k for k in rest if words[k].isdigit() and len(words[k]) <= MOST_DIGITS]
-    spoken = [part for k in rest for part in _parts(words[k])]
+    spoken = _spoken([words[k] for k in rest])
     template, number = name, None
     if span is not None:
         template = f"{name[: tokens[span[0]].start()]}{{joint}}{name[tokens[span[1] - 1].end() :]}"
@@ -160,7 +167,17 @@ def meaning(name: str, joints: Sequence[str] = ()) -> Meaning:
 
 def _without_accents(text: str) -> str:
     """Return a text of the same length without accents."""
-    return "".join(unicodedata.normalize("NFKD", letter)[0] for letter in text)
+    return "".join("s" if letter == "ß" else unicodedata.normalize("NFKD", letter)[0] for letter in text)
+
+
+def _spellings(text: str) -> frozenset[str]:
+    """Return a text in small letters as it is written without accents, and without umlauts."""
+    return frozenset(map(_plain, (text, text.translate(_UMLAUTS))))
+
+
+def _plain(text: str) -> str:
+    letters = unicodedata.normalize("NFKD", text.casefold())
+    return "".join(letter for letter in letters if not unicodedata.combining(letter))
 
 
 def _without_unit(template: str) -> str:
@@ -179,6 +196,18 @@ def _parts(word: str) -> list[str]:
     return [word]
 
 
+def _spoken(words: Sequence[str]) -> list[str]:
+    """Return the words of a name, without what is no quantity beside the next or the last one."""
+    parts = [part for word in words for part in _parts(word)]
+    beside = zip(["", *parts], parts, [*parts[1:], ""], strict=False)
+    return [
+        word
+        for before, word, behind in beside
+        if not (word in _OF_NOW and behind in _WORDS and len(behind) > 1)
+        and not (word == _AMPLIFIER and before not in MEASURED | COMMANDED)
+    ]
+
+
 def _unit(name: str, words: Sequence[str], quantity: str) -> str | None:
     tables = [table_of(quantity, linear=linear) for linear in (False, True)]
     last = next((word for word in reversed(words) if not word.isdigit()), "")
@@ -193,20 +222,29 @@ def _unit(name: str, words: Sequence[str], quantity: str) -> str | None:
     return None
 
 
-def _joint(words: Sequence[str], joints: Sequence[str]) -> tuple[int | None, tuple[int, int] | None]:
-    """Find the joint that a name contains, by its longest form, and the words that it takes."""
+def _joint(words: Sequence[frozenset[str]], joints: Sequence[str]) -> tuple[int | None, tuple[int, int] | None]:
+    """Find the joint that a name contains, by its longest form, and the words that it takes, each in its spellings."""
     best: tuple[int, int, tuple[int, int]] | None = None
     for index, forms in enumerate(_forms(joints)):
         for form in forms:
             for start in range(len(words) - len(form) + 1):
-                if tuple(words[start : start + len(form)]) == form and (best is None or len(form) > best[0]):
+                spelled = words[start : start + len(form)]
+                if all(map(frozenset.__contains__, spelled, form)) and (best is None or len(form) > best[0]):
                     best = (len(form), index, (start, start + len(form)))
     return (None, None) if best is None else (best[1], best[2])
 
 
 def _forms(joints: Sequence[str]) -> list[list[tuple[str, ...]]]:
     """List for every joint the words by which a logger may call it; no form stands for two joints."""
-    full = [tuple(token[0].lower() for token in _TOKEN.finditer(joint)) for joint in joints]
+    spelled = [joints, [joint.translate(_UMLAUTS) for joint in joints]]
+    forms = [list(dict.fromkeys(each)) for each in map(list.__add__, *map(_every_form, spelled))]
+    every = [form for mine in forms for form in mine]
+    return [[form for form in mine if every.count(form) == 1] for mine in forms]
+
+
+def _every_form(joints: Sequence[str]) -> list[list[tuple[str, ...]]]:
+    plain = [_without_accents(joint.replace("ß", "ss")) for joint in joints]
+    full = [tuple(token[0].lower() for token in _TOKEN.finditer(joint)) for joint in plain]
     shared = 0
     while len(full) > 1 and all(len(words) > shared + 1 and words[shared] == full[0][shared] for words in full):
         shared += 1
@@ -219,8 +257,7 @@ def _forms(joints: Sequence[str]) -> list[list[tuple[str, ...]]]:
             if shorter not in mine and any(not word.isdigit() and word not in _WORDS for word in shorter):
                 mine.append(shorter)
         forms.append(mine)
-    every = [form for mine in forms for form in mine]
-    return [[form for form in mine if every.count(form) == 1] for mine in forms]
+    return forms
 
 
 def meanings_by_place(numbers: Mapping[str, Array], counts: Sequence[int]) -> dict[str, Meaning]:

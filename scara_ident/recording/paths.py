@@ -7,6 +7,7 @@ import os
 import re
 from collections.abc import Sequence
 from pathlib import Path
+from shlex import quote
 
 from scara_ident.errors import RecordingError, UsageError
 from scara_ident.files import real_path
@@ -67,8 +68,7 @@ def _paths(word: str) -> list[Path]:
         found = _in_folder(path)
         if not found:
             raise RecordingError(
-                f"{path}: no .parquet or .csv file in this folder, nor another recording ({_others()}); "
-                "name one that holds recordings"
+                f"{path}: no .parquet or .csv file in this folder, nor another recording ({_others()}); {_within(path)}"
             )
         return found
     if path.exists():
@@ -84,6 +84,18 @@ def _paths(word: str) -> list[Path]:
     if not found:
         raise RecordingError(f"{word}: matches {len(matches)} files but no .parquet or .csv file ({_others()})")
     return found
+
+
+def _within(folder: Path) -> str:
+    """Say how to name recordings in folders of a folder that has none itself."""
+    inside = [each for each in folder.iterdir() if each.is_dir() and each.name[0] != "."]
+    if not inside:
+        return "name one that holds recordings"
+    signs = "*" if any(map(_in_folder, inside)) else "**"
+    word = quote(os.path.join(glob.escape(str(folder)), signs))
+    return (
+        f"folders inside are not searched: {word} takes the recordings of {'these' if signs == '*' else 'all of them'}"
+    )
 
 
 def _others() -> str:

@@ -24,7 +24,7 @@ from scara_ident.recording.files.parquet_rows import read_rows
 from scara_ident.recording.long_file import LongFile, long_file
 from scara_ident.recording.one_clock import on_one_clock
 from scara_ident.recording.paths import distinct_names, recording_name, recording_paths
-from scara_ident.recording.wanted import lacking_numbers, optional_channels, refuse_missing
+from scara_ident.recording.wanted import encoding_finding, lacking_numbers, optional_channels, refuse_missing
 from scara_ident.robot.signal_map import SIGNALS, Channel, Channels, contract_channels
 
 if TYPE_CHECKING:
@@ -160,7 +160,7 @@ def read_recording(path: Path | str, robot: Robot, *, need_effort: bool = True) 
         return read_columns(path, wanted, channels.topic)
 
     found = recording_of(path, names, read, robot, channels, need_effort=need_effort, shared_clock=shared)
-    return replace(found, path=path)
+    return replace(found, path=path, findings=(*encoding_finding(path), *found.findings))
 
 
 def read_parts(long: LongFile, robot: Robot) -> Iterator[Recording | RecordingError]:

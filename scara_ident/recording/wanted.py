@@ -13,6 +13,7 @@ import numpy as np
 from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError
 from scara_ident.recording.audit import Finding, Samples
+from scara_ident.recording.files.csv_layout import ENCODINGS, csv_layout
 from scara_ident.robot.signal_map import SIGNALS, Channel, Channels
 
 OPTIONAL = ("velocity", "acceleration", "temperature")
@@ -57,6 +58,13 @@ def refuse_missing(path: Path, names: Sequence[str], wanted: Sequence[str], chan
         )
         remedy += "recording: {time: {rate: 100}}"
     raise RecordingError(f"{path}: no column {name!r}{more}; {guess}its {kind}: {shown}; {remedy}")
+
+
+def encoding_finding(path: Path) -> list[Finding]:
+    """Say that a CSV file, whose columns could be listed, is read as what it does not say that it is."""
+    if path.suffix.lower() != ".csv" or csv_layout(path).encoding != ENCODINGS[-1]:
+        return []
+    return [Finding("encoding", "the file is not in UTF-8: read as Windows-1252")]
 
 
 def _declaring(channels: Channels, column: str) -> str:

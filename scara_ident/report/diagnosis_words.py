@@ -15,7 +15,7 @@ from scara_ident.diagnosis.next_steps import next_steps
 from scara_ident.diagnosis.outcome import Unexplained
 from scara_ident.effects import Parameter
 from scara_ident.estimation.run_offsets import rms_of
-from scara_ident.estimation.urdf_scale import told_scale
+from scara_ident.estimation.urdf_weight import told_scale
 from scara_ident.identification.gravity_check import gravity_said
 from scara_ident.model.terms.friction import Friction
 from scara_ident.report.identification import bias_said

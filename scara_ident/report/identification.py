@@ -15,7 +15,8 @@ from scara_ident.estimation.estimate import PAPER_SAMPLES
 from scara_ident.estimation.noise_bias import bias_sentence
 from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.saved import estimate_dict
-from scara_ident.estimation.urdf_scale import scale_sentence, told_scale, urdf_scale
+from scara_ident.estimation.urdf_scale import scale_sentence, urdf_scale
+from scara_ident.estimation.urdf_weight import rotor_sentence, told_scale
 from scara_ident.export.result import KEY, rebuild_entry
 from scara_ident.identification.gravity_check import gravity_said
 from scara_ident.identification.identify import Identification, not_told_from_zero, undetermined, worst_validation
@@ -154,7 +155,11 @@ def sentences(identification: Identification) -> tuple[str, ...]:
         # Under efforts of opposite sign bodies and gravity are nobody's.
         found.append(scale_sentence(None, robot))
         return tuple(found)
-    found.append(told_scale(identification.estimate, identification.training))
+    seen = identification.estimate, identification.training
+    found.append(told_scale(*seen))
+    rotors = rotor_sentence(*seen)
+    if rotors is not None:
+        found.append(rotors)
     gravity = gravity_said(identification.training)
     if gravity is not None:
         found.append(gravity)

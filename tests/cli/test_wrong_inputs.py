@@ -30,7 +30,7 @@ RECORDINGS = [
     ("numbers_1.csv", 1, ("numbers_1.csv: the first line holds numbers", "put the column names there")),
     ("long_1.csv", 1, ("long_1.csv: row 1 has 6 values for 5 columns", "correct or remove")),
     ("twice_1.csv", 1, ("twice_1.csv: column 'joint1.effort' stands in the header twice", "rename one")),
-    ("latin_1.csv", 1, ("latin_1.csv: not a text file in UTF-8", "save the CSV again")),
+    ("no_text_1.csv", 1, ("no_text_1.csv: not a text file in UTF-8, UTF-16 or Windows-1252", "save the CSV again")),
     ("cut_1.parquet", 1, ("cut_1.parquet: not a whole parquet file", "copy or record it again")),
     ("log.txt", 1, ("log.txt: suffix '.txt' is not known", ".parquet, .csv")),
     ("picture.png", 1, ("picture.png: suffix '.png' is not known", ".parquet, .csv")),

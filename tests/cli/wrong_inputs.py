@@ -35,7 +35,8 @@ def _recordings(place: Path) -> None:
     (place / "numbers_1.csv").write_text("\n".join([first, *rest]) + "\n")
     (place / "long_1.csv").write_text("\n".join([header, f"{first},7", *rest]) + "\n")
     (place / "twice_1.csv").write_text("\n".join([header.replace("joint2.effort", "joint1.effort"), first, *rest]))
-    (place / "latin_1.csv").write_bytes(b"time,joint1.position \xb0\n0,1\n")
+    # A byte that is no letter in Windows-1252 either.
+    (place / "no_text_1.csv").write_bytes(b"time,joint1.position \x81\n0,1\n")
     (place / "cut_1.parquet").write_bytes((place / "good_1.parquet").read_bytes()[:-200])
     (place / "log.txt").write_text("not a recording\n")
     (place / "picture.png").write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(200))

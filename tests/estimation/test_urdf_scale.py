@@ -15,10 +15,10 @@ from scara_ident.estimation.urdf_scale import (
     gravity_acts,
     scale_sentence,
     slight_joints,
-    told_scale,
     unlike_urdf,
     urdf_scale,
 )
+from scara_ident.estimation.urdf_weight import told_scale
 from scara_ident.model.model import build_model
 from scara_ident.motion.prepared import prepare
 from scara_ident.recording.recording import Recording

@@ -46,6 +46,14 @@ def test_an_arm_without_shapes_or_with_lost_ones_says_so(tmp_path):
     assert lost.groups == () and "link l3: mesh package://gone/l3.stl is not found" in lost.notes[0]
     near = clearance_of(upright(tmp_path, "", BALL, BALL), *ENDS, margin=0.02)
     assert near.groups == () and "hang on one another" in near.notes[0]
+    assert near.notes[1] == "Links without a collision shape are not watched: l1."
+    assert near.notes[0].count("shapes") == 1
+    seated = upright(tmp_path, "", "", "")
+    base = f'<link name="base"><collision><geometry>{BALL}</geometry></collision></link>'
+    seated.urdf.write_text(seated.urdf.read_text().replace('<link name="base"/>', base))
+    for floor in (0.0, -np.inf):
+        (note,) = clearance_of(load_robot(seated.urdf), *ENDS, margin=0.02, floor=floor).notes
+        assert "arm.urdf has no collision shapes on the links that move (l1, l2, l3); rehearse" in note
     robot = upright(tmp_path, "", "", "")
     with pytest.raises(UsageError, match="boxes: Collisions were not looked for"):
         limits_of(robot, boxes=[((1.0, 0.0, 0.0), (0.1, 0.1, 0.1))])

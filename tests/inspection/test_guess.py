@@ -59,6 +59,14 @@ def test_matrices_of_a_mat_file_are_matched_by_order(tmp_path):
     assert_same(read_back(found, tmp_path), tmp_path, signals=("position", "effort"))
 
 
+def test_short_names_of_controllers_are_positions_and_currents(tmp_path):
+    q, tau = (np.array([MADE[f"{j}.{s}"] for j in ("joint1", "joint2")]) for s in ("position", "effort"))
+    path = write_mat(tmp_path / "log.mat", {"t": MADE["time"], "ActPos": q.T, "ActCur": tau.T})
+    found = inspected(path, tmp_path, two_joints(tmp_path))
+    assert found.mapping["position"] == {"column": "ActPos[{index}]", "unit": "rad"}
+    assert found.mapping["effort"] == {"column": "ActCur[{index}]", "unit": "A"}
+
+
 def test_the_topic_with_the_arms_joints_is_chosen(tmp_path):
     other = {name.replace("joint", "finger"): values for name, values in MADE.items()}
     bag = write_bag(tmp_path / "run", MADE | other, topics=("/b/joint_states",))

@@ -45,6 +45,27 @@ UR = ("shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint
         ("vitesse mesurée axe 5 (deg/s)", "velocity", None, 5, "deg/s"),
         ("Accélération 1", "acceleration", None, 1, None),
         ("couple_articulation_6", "effort", None, 6, None),
+        ("ActPos[0]", "position", None, 0, None),
+        ("AktVel_2", "velocity", None, 2, None),
+        ("IstSpd2", "velocity", None, 2, None),
+        ("ActCur[4]", "effort", None, 4, None),
+        ("actcurr_1", "effort", None, 1, None),
+        ("Akt.Trq[1] (Nm)", "effort", None, 1, "N m"),
+        ("ActTorque1", "effort", None, 1, None),
+        ("IstAmp_3", "effort", None, 3, None),
+        ("elbow_amps", "effort", 2, None, "A"),
+        ("cur_pos_1", "position", None, 1, None),
+        ("CurrentVel[1]", "velocity", None, 1, None),
+        ("current_temp_1", "temperature", None, 1, None),
+        ("cur_time", "time", None, None, None),
+        ("Current Time (ms)", "time", None, None, "ms"),
+        ("current_t_1", "effort", None, 1, None),
+        ("amp_status_1", None, None, 1, None),
+        ("AmpTemp1", "temperature", None, 1, None),
+        ("Amp[1]", None, None, 1, None),
+        ("Amplitude 1", None, None, 1, None),
+        ("Action[1]", None, None, 1, None),
+        ("cursor_1", None, None, 1, None),
         # A number of more digits than Python reads.
         ("position_" + 5000 * "9", "position", None, None, None),
     ],
@@ -62,12 +83,35 @@ def test_a_prefix_of_all_joints_may_be_left_out_and_ambiguous_short_names_count_
 
 
 @pytest.mark.parametrize(
+    ("name", "joint"),
+    [
+        ("Säule Istposition [°]", 0),
+        ("Rucken Istposition", 3),
+        ("SÄULE_POS", 0),
+        ("Saeule.position", 0),
+        ("Fußgelenk Winkel", 1),
+        ("épaule position", 2),
+        ("EpaulePosition", 2),
+        ("Ruecken pos", 3),
+        ("Rücken pos", 3),
+        ("Hubsäule pos", None),
+    ],
+)
+def test_umlauts_and_accents_may_be_written_out_in_the_column_or_in_the_urdf(name, joint):
+    said = meaning(name, ("saeule", "fussgelenk", "epaule", "rücken"))
+    assert said.joint == joint
+    assert joint is None or said.template.startswith("{joint}")
+
+
+@pytest.mark.parametrize(
     ("name", "commanded", "measured"),
     [
         ("Sollposition A1", True, False),
         ("IstPosition A1", False, True),
         ("consigne couple 2", True, False),
         ("angle mesuré 2", False, True),
+        ("AktPos_2", False, True),
+        ("actpos 2", False, True),
         ("Motormoment_1", False, False),
     ],
 )
@@ -75,6 +119,10 @@ def test_german_and_french_say_what_was_asked_for_and_what_was_sensed(name, comm
     said = meaning(name)
     assert (said.commanded, said.measured) == (commanded, measured)
     assert said.template.count("{number}") == 1
+
+
+def test_a_torque_of_now_is_no_current():
+    assert "current" not in meaning("current_torque_1").words and "cur" in meaning("ActCur[1]").words
 
 
 def table(*signals: str) -> dict[str, np.ndarray]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 
 import pytest
@@ -66,6 +67,18 @@ def test_words_that_name_nothing_are_bad_usage_and_places_without_recordings_an_
         recording_paths([tmp_path])
     with pytest.raises(RecordingError, match=r"no \.parquet or \.csv file"):
         recording_paths([str(tmp_path / "*")])
+
+
+def test_a_folder_of_folders_says_the_word_that_takes_them(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for place in ("runs [1]/26", "runs [1]/27", "deep/a/b"):
+        Path(place).mkdir(parents=True)
+        save(Path(place) / "OJD_1.parquet", columns(60))
+    for folder, count in (("runs [1]", 2), ("deep", 1)):
+        with pytest.raises(RecordingError, match=r"folders inside are not searched: .* takes") as caught:
+            recording_paths([folder])
+        (word,) = shlex.split(str(caught.value).partition("searched: ")[2].partition(" takes")[0])
+        assert len(recording_paths([word])) == count
 
 
 def test_two_files_of_one_name_in_a_folder_are_refused_by_both_names(tmp_path):

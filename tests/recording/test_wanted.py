@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from scara_ident.errors import RecordingError
-from scara_ident.recording.wanted import optional_channels, refuse_missing
+from scara_ident.recording.wanted import encoding_finding, optional_channels, refuse_missing
 from scara_ident.robot.signal_map import contract_channels
 
 CHANNELS = contract_channels(("j1", "j2"))
@@ -28,6 +28,14 @@ WANTED = ["time", "j1.position", "j2.position"]
 def test_a_missing_column_has_a_remedy(names: list[str], said: str):
     with pytest.raises(RecordingError, match=said):
         refuse_missing(Path("a.csv"), names, WANTED, CHANNELS)
+
+
+def test_an_encoding_that_the_file_does_not_say_is_said(tmp_path: Path):
+    path = tmp_path / "a.csv"
+    for encoding, said in (("utf-8", 0), ("utf-16", 0), ("cp1252", 1)):
+        path.write_bytes("time;Säule\n0;1\n".encode(encoding))
+        assert [finding.kind for finding in encoding_finding(path)] == said * ["encoding"]
+    assert encoding_finding(tmp_path / "a.parquet") == []
 
 
 def test_what_is_to_be_run_names_the_file_where_it_is_and_no_column_of_another_joint_is_the_one():

@@ -10,6 +10,7 @@ import csv
 import re
 from collections import Counter
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,6 +22,10 @@ from scara_ident.robot.units import BRACKETS, is_si, is_unit
 MISSING = ("NA", "N/A", "n/a", "na", "null", "None", "-")
 # A decimal comma stands behind a semicolon or tab alone, so that these come first.
 SEPARATORS = (";", "\t", ",", " ")
+# Of what begins with none of the marks below; what is no UTF-8 is mostly a controller's or spreadsheet's on Windows.
+ENCODINGS = ("utf-8-sig", "cp1252")
+# The byte order marks of UTF-16, which spreadsheets call Unicode text.
+UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 # No header is as long, nor the row of a table.
 LONGEST_LINE = 1_000_000
 # Lines that are looked at: more than controllers write before a table.
@@ -39,12 +44,15 @@ class CsvLayout:
         SI; ``column_1``, ``column_2``, ... where no line names them.
     first : int
         Lines of the file before the first row.
+    encoding : str
+        Of the lines that were looked at, as Python calls it: ``utf-8-sig``, ``cp1252`` (Windows-1252) or ``utf-16``.
     """
 
     separator: str
     decimal_comma: bool
     names: tuple[str, ...]
     first: int
+    encoding: str = ENCODINGS[0]
 
 
 def csv_layout(path: Path) -> CsvLayout:
@@ -57,9 +65,9 @@ def csv_layout(path: Path) -> CsvLayout:
     UnicodeDecodeError, csv.Error
         If it is no text, or no table.
     """
-    places, lines = _first_lines(path)
+    encoding, places, lines = _decoded(path)
     if not lines:
-        return CsvLayout(",", False, (), 0)
+        return CsvLayout(",", False, (), 0, encoding)
     separator, rows, width = _table(lines)
     header, begin = _header(rows, width)
     if header is None:
@@ -74,14 +82,29 @@ def csv_layout(path: Path) -> CsvLayout:
         raise csv.Error(f"a name of more than {csv.field_size_limit()} characters")
     first = places[begin] if begin < len(places) else places[-1] + 1
     comma = separator != "," and begin < len(lines) and "," in lines[begin]
-    return CsvLayout(separator, comma, names, first)
+    return CsvLayout(separator, comma, names, first, encoding)
 
 
-def _first_lines(path: Path) -> tuple[list[int], list[str]]:
+def _decoded(path: Path) -> tuple[str, list[int], list[str]]:
+    """Return the first encoding in which the first lines are text, and them."""
+    with path.open("rb") as file:
+        marked = file.read(2) in UTF_16
+    *others, last = ("utf-16",) if marked else ENCODINGS
+    for encoding in others:
+        with suppress(UnicodeDecodeError):
+            return encoding, *_first_lines(path, encoding)
+    places, lines = _first_lines(path, last)
+    # Windows-1252 has a letter for almost every byte, also of what is no text.
+    if last == ENCODINGS[-1] and any("\0" in line for line in lines):
+        raise UnicodeDecodeError(last, b"\0", 0, 1, "no text")
+    return last, places, lines
+
+
+def _first_lines(path: Path, encoding: str) -> tuple[list[int], list[str]]:
     """Return the first lines that are not empty, without the sign of a comment, and how many stand before each."""
     places: list[int] = []
     lines: list[str] = []
-    with path.open(encoding="utf-8-sig", newline="") as file:
+    with path.open(encoding=encoding, newline="") as file:
         for place in range(LOOKED_AT):
             line = file.readline(LONGEST_LINE)
             if len(line) == LONGEST_LINE and lines:

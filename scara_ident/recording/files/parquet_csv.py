@@ -60,7 +60,8 @@ def column_names(path: Path) -> tuple[str, ...]:
             with path.open("rb") as file, quiet_stderr():
                 names = list(pl.read_parquet_schema(file))
     except UnicodeDecodeError as error:
-        raise RecordingError(f"{path}: not a text file in UTF-8; save the CSV again in UTF-8") from error
+        said = "not a text file in UTF-8, UTF-16 or Windows-1252; save the CSV again in UTF-8"
+        raise RecordingError(f"{path}: {said}") from error
     except csv.Error as error:
         raise RecordingError(f"{path}: its first line is no header ({error}); put the column names there") from error
     except (pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError) as error:
@@ -101,7 +102,7 @@ def read_columns(path: Path, names: Sequence[str]) -> dict[str, Array]:
             # What is damaged may make it panic, and say so on its own.
             with quiet_stderr():
                 frame = pl.read_parquet(path, columns=list(names), glob=False, hive_partitioning=False)
-    except (pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError) as error:
+    except (pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError, UnicodeDecodeError) as error:
         raise damaged_table(path, error) from error
     return {name: numbers(path, frame[name]) for name in names}
 
@@ -157,6 +158,8 @@ def _read_csv(path: Path, names: Sequence[str]) -> pl.DataFrame:
         "null_values": list(MISSING),
         "glob": False,
         "raise_if_empty": False,
+        # Numbers and what parts them are the same bytes in all others; words beside them are not wanted.
+        "encoding": layout.encoding if layout.encoding == "utf-16" else "utf8-lossy",
     }
 
     def schema(kind: type[pl.DataType]) -> dict[str, type[pl.DataType]]:
@@ -226,7 +229,7 @@ def numbers(path: Path, series: pl.Series) -> Array:
 
 def _refuse_long_rows(path: Path, layout: CsvLayout) -> None:
     width = len(layout.names)
-    with path.open(encoding="utf-8-sig", newline="", errors="replace") as file:
+    with path.open(encoding=layout.encoding, newline="", errors="replace") as file:
         rows = csv.reader(islice(file, layout.first, None), delimiter=layout.separator)
         # A field longer than Python's parser takes is no number, and said to be none where it is wanted.
         with suppress(csv.Error):

@@ -14,6 +14,14 @@ from scara_ident.recording.files.parquet_csv import read_columns
 HEAD, ROWS = "time,q,tau", ["0.0,1.5,2", "0.1,1.25,-3e-1", "0.2,1.0,4"]
 
 
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "cp1252", "utf-16"])
+def test_the_encoding_is_the_first_in_which_the_lines_are_text(tmp_path, encoding):
+    path = tmp_path / "log.csv"
+    path.write_bytes("\n".join(["time,größe,°", *ROWS]).encode(encoding))
+    found = csv_layout(path)
+    assert (found.encoding, found.names) == (encoding, ("time", "größe", "°"))
+
+
 @pytest.mark.parametrize(
     ("before", "names", "first"),
     [

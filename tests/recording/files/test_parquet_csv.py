@@ -32,7 +32,9 @@ def test_files_that_are_no_recordings_are_refused_in_a_line(robot, tmp_path):
         "cut.parquet": (whole[: len(whole) // 2], "not a whole parquet file"),
         "header.csv": (b"time,joint1.position,joint2.position,joint1.effort,joint2.effort\n", "0 usable samples"),
         "numbers.csv": (b"0.0,1.0,2.0,0.1,0.2\n0.1,1.0,2.0,0.1,0.2\n", "first line holds numbers"),
-        "latin.csv": ("time,größe\n0,1\n".encode("latin-1"), "UTF-8"),
+        "no_text.csv": (b"time,gr\x81\x9de\n0,1\n", "save the CSV again in UTF-8"),
+        "picture.csv": (b"\x89PNG\r\n\x1a\n\0\0,1\n", "save the CSV again in UTF-8"),
+        "half.csv": ("time,größe\n0,1\n".encode("utf-16")[:-1], "save the CSV again in UTF-8"),
         "log.xlsx": (b"PK", "suffix '.xlsx'"),
         "log": (b"PK", "suffix ''"),
         "log.txt": (b"time,q\n0,1\n", "rename it to log.csv, whatever separates"),
@@ -45,6 +47,24 @@ def test_files_that_are_no_recordings_are_refused_in_a_line(robot, tmp_path):
     assert "no such file" in refusal(tmp_path / "absent.parquet", robot)
     (tmp_path / "folder.parquet").mkdir()
     assert "is a directory" in refusal(tmp_path / "folder.parquet", robot)
+
+
+@pytest.mark.parametrize(
+    ("encoding", "said"),
+    [("utf-8", ""), ("utf-8-sig", ""), ("utf-16", ""), ("cp1252", "the file is not in UTF-8: read as Windows-1252")],
+)
+def test_a_csv_is_read_in_the_encodings_of_windows_too(robot, tmp_path, encoding, said):
+    rows = [line.replace(",", ";").replace(".", ",") for line in csv_lines()]
+    rows = ["Säule \u2013 Prüfstand;5 €", rows[0].replace(",", ".") + ";Größe", *(f"{row};Stück" for row in rows[1:])]
+    path = tmp_path / "log_1.csv"
+    path.write_bytes("\r\n".join(rows).encode(encoding))
+    found = read_recording(path, robot)
+    assert "; ".join(finding.message for finding in found.findings) == said
+    whole = read_recording(save(tmp_path / "whole.parquet", columns(200)), robot)
+    np.testing.assert_array_equal(found.position, whole.position)
+    rows[5] = rows[5].replace(";", ";Größe;", 1)
+    path.write_bytes("\r\n".join(rows).encode(encoding))
+    assert "row 4 has 7 values for 6 columns" in refusal(path, robot)
 
 
 def test_damage_anywhere_in_a_parquet_file_never_ends_in_another_exception(robot, tmp_path):
