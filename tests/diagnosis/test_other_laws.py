@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,7 +13,7 @@ from scara_ident.diagnosis.effect_parameters import physical_parameters
 from scara_ident.diagnosis.other_laws import parameters_of_laws
 from scara_ident.diagnosis.selection_step import SelectionStep
 from scara_ident.effects import Member, effects_named
-from scara_ident.effects.friction import Stribeck
+from scara_ident.effects.friction import AsymmetricFriction, Stribeck
 from scara_ident.effects.gear import TransmissionLoss
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import load_robot
@@ -55,6 +57,20 @@ def test_where_two_laws_explain_as_much_parameters_are_no_surer_than_what_they_d
         assert told[name].value == own[name].value
         assert told[name].std > own[name].std
     assert told["amplitude"].std > 0.5 * abs(other["amplitude"].value - own["amplitude"].value)
+
+
+def test_what_laws_differ_by_is_in_every_number_that_is_told_twice():
+    """An effect beside was told by a standard deviation that lacked what the laws of the other moved it by."""
+    noise = 20.0
+    step = step_of(runs_by(2, noise), 2, noise)
+    step = replace(step, chosen=(Candidate(AsymmetricFriction(), Member(0)), *step.chosen))
+    told = parameters_of_laws(step)
+    places = [step.observations.parameters, step.observations.parameters + 1]
+    for place, effect, name in zip(places, told.effects, ("viscous_difference", "amplitude"), strict=True):
+        one = effect[name]
+        found = told.linear.value[place], np.sqrt(told.linear.covariance[place, place])
+        assert found == pytest.approx((one.value, one.std), rel=1e-9)
+    assert told.effects[0]["viscous_difference"].std > physical_parameters(step).effects[0]["viscous_difference"].std
 
 
 @pytest.mark.slow
