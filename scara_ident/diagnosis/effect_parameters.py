@@ -189,9 +189,7 @@ def _told(
     return found
 
 
-def _further(
-    scene: Scene, candidate: Candidate, linear: Coefficients, parameters: Mapping[str, Parameter]
-) -> Array:
+def _further(scene: Scene, candidate: Candidate, linear: Coefficients, parameters: Mapping[str, Parameter]) -> Array:
     """Return by how much the variance of an effect's coefficients is more than that of the fit, shape (k,).
 
     A coefficient that is told by its name among the physical parameters is as unsure as it is there: a family may know of more.
