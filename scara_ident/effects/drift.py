@@ -35,7 +35,7 @@ LEAST_POWER: dict[Part, float] = {"all": 0.0, "coulomb": 0.0, "viscous": 1.0}
 PARTS: dict[Part, str] = {
     "all": "friction",
     "coulomb": "Coulomb friction",
-    "viscous": "the friction that grows with speed",
+    "viscous": "friction that grows with speed",
 }
 # A drift within this many standard deviations of none is an offset.
 DRIFT_STDS = 3.0
@@ -65,7 +65,7 @@ class WarmUp(Effect):
     summary = "friction that falls as the run goes on"
     coefficients = (
         Coefficient(
-            "share", "1", "how much more {part} {joint} has at the start of a run, as a share",
+            "share", "1", "further {part} of {joint} at the start of a run, as a share",
             "friction would be smaller when the run starts",
             LARGEST_WARM_UP_SHARE, f"friction would fall to less than a {1.0 + LARGEST_WARM_UP_SHARE:.0f}th in the run",
         ),
