@@ -70,12 +70,13 @@ effect](howto/my-own-effect.md).
 
 @dataclass(frozen=True)
 class Case:
-    """An effect as the virtual arm has it, or as a torque added to its recordings; on the SCARA03, or on joints of a UR5."""
+    """An effect as the virtual arm has it, or as a torque added to its recordings; on the SCARA03, or on joints of another arm."""
 
     hidden: str = ""
     joints: tuple[str, ...] = ()
     rate: float = RATE
     added: tuple[Effect, Member, tuple[float, ...]] | None = None
+    urdf: str = "ur5"
 
 
 def _families(name: str) -> list[Effect]:
@@ -87,6 +88,7 @@ def _only(name: str) -> Effect:
 
 
 WRIST = ("wrist_1_joint", "wrist_2_joint", "wrist_3_joint")
+LIFT = ("torso_lift_joint", "arm_1_joint")
 UPPER_ARM = ("shoulder_lift_joint", "elbow_joint")
 # All others are as `simulate --effect NAME` has them.
 CASES = {
@@ -97,6 +99,7 @@ CASES = {
     "joint_zero": Case("joint_zero:shoulder_lift_joint:offset=0.3", UPPER_ARM),
     "joint_elasticity": Case("joint_elasticity:joint1:stiffness=2500"),
     "coupled_shaft": Case("coupled_shaft", WRIST),
+    "rope_weight": Case(joints=LIFT, urdf="tiago_no_hand", added=(_only("rope_weight"), Member(0), (12.0,))),
     "inertia_coupling": Case(joints=WRIST, added=(_only("inertia_coupling"), Member(1, (), 2), (0.02,))),
     "gravity_counterbalance": Case(joints=UPPER_ARM, added=(_only("gravity_counterbalance"), Member(1), (6.0, 3.0))),
     "drive_coupling": Case(added=(_only("drive_coupling"), Member(0, (), 1), (0.15,))),
@@ -171,9 +174,9 @@ def names() -> list[str]:
     return list(dict.fromkeys(effect.name for effect in CATALOGUE))
 
 
-def _ur5(joints: Sequence[str]) -> Robot:
-    """Return a UR5 whose other joints are locked."""
-    urdf = example_urdf("ur5")
+def _arm(name: str, joints: Sequence[str]) -> Robot:
+    """Return an example's arm whose other joints are locked."""
+    urdf = example_urdf(name)
     return build_robot(RobotDescription(urdf=urdf, effort_side="joint", joints=dict.fromkeys(joints)), urdf)
 
 
@@ -182,6 +185,10 @@ def sines(robot: Robot, seed: int, name: str, seconds: float = 20.0) -> Referenc
     rng = np.random.default_rng(seed)
     size, phase = rng.uniform(0.5, 1.0, (2, robot.n, 5))
     middle = np.array([-1.2, 1.2, 0.5])[: robot.n, None]
+    # A joint that slides stays within three quarters of its range, which is shorter than what joints turn by.
+    slides, reach = robot.prismatic[:, None], 0.5 * (robot.upper - robot.lower)[:, None]
+    middle = np.where(slides, (robot.lower[:, None] + reach), middle)
+    size = np.where(slides, 0.25 * reach, 1.0) * size
 
     def motion(time: Array) -> tuple[Array, Array, Array]:
         q, v, a = middle + 0.0 * time, 0.0 * middle * time, 0.0 * middle * time
@@ -197,7 +204,7 @@ def sines(robot: Robot, seed: int, name: str, seconds: float = 20.0) -> Referenc
 def recordings(name: str) -> tuple[Robot, list[Recording], str]:
     """Record the virtual arm of an effect on three motions, twice each; return robot, recordings and what was hidden."""
     case = CASES.get(name, Case(name))
-    robot = _ur5(case.joints) if case.joints else load_robot()
+    robot = _arm(case.urdf, case.joints) if case.joints else load_robot()
     arm = virtual_arm(robot)
     if not case.joints:
         motions = [named_motion(word, robot) for word in ("OJD", "OJK", "L1")]

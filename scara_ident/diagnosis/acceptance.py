@@ -26,6 +26,9 @@ class Decision:
     tentative : bool
         Not accepted, but worth a look: an arm can have it, it helps as much as is asked, and these recordings are too few
         or too alike to be sure.
+    as_no_arm : float
+        The gain, where it is significant and only the sign or the size is none that a real arm can have; 0 elsewhere. Something
+        that is no noise goes as this effect does.
     """
 
     candidate: Candidate
@@ -35,6 +38,7 @@ class Decision:
     why: str
     gain: float
     tentative: bool = False
+    as_no_arm: float = 0.0
 
     def refused(self, why: str) -> Decision:
         """Return it as one that may be looked at, and not believed."""
@@ -54,17 +58,20 @@ def decide(
         Candidates and scan points tried, for the correction of the p-value.
     """
     unseen = _unseen(examination, criteria) or _faint(examination, gain, criteria)
-    impossible = _unseen(examination, criteria) or _inadmissible(candidate, examination, scene)
+    of_no_arm = _inadmissible(candidate, examination, scene)
+    impossible = _unseen(examination, criteria) or of_no_arm
     small = impossible or _small(candidate, examination, scene, gain, criteria)
     seldom = _seldom(candidate, examination, gain, criteria)
     # The first reason that a person would give.
     why = unseen or _insignificant(examination, tried, criteria) or small or seldom
+    sure = unseen is None and seldom is None and _insignificant(examination, tried, criteria) is None
+    as_no_arm = max(gain, 0.0) if sure and of_no_arm is not None else 0.0
     if _wrong_sign(candidate, examination):
         # The best that a real one can be is absent: nothing is removed, and nothing speaks for it.
         examination, gain = replace(examination, p_value=1.0), min(gain, 0.0)
     words = why or f"removes {gain:.1%} of the squared residual on data that it was not fitted to"
     tentative = why is not None and small is None and examination.p_value <= criteria.significant
-    return Decision(candidate, candidate.label(scene), examination, why is None, words, gain, tentative)
+    return Decision(candidate, candidate.label(scene), examination, why is None, words, gain, tentative, as_no_arm)
 
 
 def _wrong_sign(candidate: Candidate, examination: Examination) -> bool:

@@ -133,6 +133,7 @@ def physical_parameters(step: SelectionStep, *, of_runs: bool = True, of_noise: 
     undetermined = merge([state.information, state.prior]).solve().undetermined
     found: list[dict[str, Parameter]] = []
     coefficients = []
+    further = np.zeros(state.linear)
     for owner, (candidate, own) in enumerate(zip(step.chosen, state.places, strict=True)):
         linear = Coefficients(state.value[own], covariance[own, own])
         coefficients.append(linear)
@@ -152,10 +153,12 @@ def physical_parameters(step: SelectionStep, *, of_runs: bool = True, of_noise: 
                 parameters[parameter.name] = parameter.parameter(
                     unknown.value, float(np.sqrt(max(variance, 0.0))), unit
                 )
+        further[own] = _further(step.scene, candidate, linear, parameters)
         found.append(parameters)
     own = slice(state.linear)
+    whole = covariance[own, own] + np.diag(further)
     linear = LinearParameters(
-        *(state.value, covariance[own, own], undetermined[own], spread.kind), None if bias is None else bias[own]
+        *(state.value, whole, undetermined[own], spread.kind), None if bias is None else bias[own]
     )
     return PhysicalParameters(tuple(found), tuple(coefficients), _rotors(step, state, covariance), linear)
 
@@ -184,6 +187,20 @@ def _told(
             if item.value != found[name].value:
                 found[name] = replace(found[name], std=np.inf)
     return found
+
+
+def _further(scene: Scene, candidate: Candidate, linear: Coefficients, parameters: Mapping[str, Parameter]) -> Array:
+    """Return by how much the variance of an effect's coefficients is more than that of the fit, shape (k,).
+
+    A coefficient that is told by its name among the physical parameters is as unsure as it is there: a family may know of more.
+    """
+    names = [column.name for column in candidate.effect.columns(scene, candidate.member)]
+    told = [parameters.get(name) for name in names]
+    same = [
+        item.std**2 if item is not None and item.value == x and np.isfinite(item.std) else 0.0
+        for item, x in zip(told, linear.value, strict=True)
+    ]
+    return np.asarray(np.maximum(np.array(same) - np.diag(linear.covariance), 0.0))
 
 
 def _rotors(step: SelectionStep, state: Linearised, covariance: Array) -> tuple[RotorInertia, ...]:

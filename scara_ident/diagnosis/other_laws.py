@@ -19,7 +19,7 @@ def parameters_of_laws(step: SelectionStep) -> PhysicalParameters:
     """Return the physical parameters of all chosen effects, as uncertain as it is by which law they are.
 
     Where another law of an effect explains as much, its parameters by that one are as good: what they differ by is one
-    more standard deviation, and so it is of all linear parameters beside it. So it is with other fits of effects that act together,
+    more standard deviation, and so it is of all parameters beside it. So it is with other fits of effects that act together,
     see `as_good`. An effect by another law than that of its name has what tells the law among its parameters.
     """
     own = physical_parameters(step)
@@ -29,15 +29,15 @@ def parameters_of_laws(step: SelectionStep) -> PhysicalParameters:
         effects[place] = {**effects[place], **item.effect.law()}
         for other in _as_good(step, place):
             told = physical_parameters(other)
-            effects[place] = widened(effects[place], told.effects[place])
+            effects = [widened(each, its) for each, its in zip(effects, told.effects, strict=True)]
             linear = _apart(linear, told, np.arange(len(linear.value)))
     for other in as_good(step):
         told = physical_parameters(other)
-        for place, item in enumerate(step.chosen):
-            if item.effect.together:
-                effects[place] = widened(effects[place], told.effects[place])
         # What other rows say of the base model is less, and no other fit of these.
         same_rows = other.columns is step.columns
+        for place, item in enumerate(step.chosen):
+            if same_rows or item.effect.together:
+                effects[place] = widened(effects[place], told.effects[place])
         linear = _apart(linear, told, np.arange(len(linear.value)) if same_rows else _places(step, own))
     return replace(own, effects=tuple(effects), linear=linear)
 

@@ -141,13 +141,22 @@ def outcome_of(task: SearchTask, found: Search) -> Outcome:
         made = noise_torque(training, after.value)
         small = np.maximum(made, np.array(list(least_share.values())) * torque)
     least_rms, of_positions = (dict(zip(joints, each.tolist(), strict=True)) for each in (small, made))
+    # A force that nearly all goes with the position is neither a filter's nor an encoder's, though no effect of an arm is so.
+    along = {
+        item.candidate.joint(found.scene)
+        for item in found.decisions
+        if item.candidate.effect.of_position and item.as_no_arm >= criteria.nearly_all
+    }
     repeating = [
         fit
         for fit in repeating
-        if fit.missing > least_rms[fit.joint]
-        and (
-            coloured[fit.joint] > criteria.colour_of_remainder
-            or fit.missing > criteria.far_above_noise * max(fit.noise, of_positions[fit.joint])
+        if (fit.missing > of_positions[fit.joint] and fit.joint in along)
+        or (
+            fit.missing > least_rms[fit.joint]
+            and (
+                coloured[fit.joint] > criteria.colour_of_remainder
+                or fit.missing > criteria.far_above_noise * max(fit.noise, of_positions[fit.joint])
+            )
         )
     ]
     depending = [item for item in depending if item.rms > least_rms[item.joint]]

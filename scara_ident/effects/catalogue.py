@@ -16,7 +16,7 @@ from scara_ident.effects.measurement import BentTorqueSensor, TimeDelay, TorqueG
 from scara_ident.effects.payload import FreePayloadChange, GravityCounterbalance, PayloadChange, PayloadOfRecordings
 from scara_ident.effects.payload_intervals import PayloadInIntervals
 from scara_ident.effects.periodic import EncoderEccentricity, TorqueRipple, Vibration
-from scara_ident.effects.position import Spring
+from scara_ident.effects.position import RopeWeight, Spring
 from scara_ident.effects.presliding import Presliding
 from scara_ident.effects.recording_delays import DelayOfEachRecording
 from scara_ident.effects.shaft import CoupledShaft
@@ -41,6 +41,7 @@ CATALOGUE: tuple[Effect, ...] = (
     EncoderEccentricity(),
     Vibration(),
     Spring(),
+    RopeWeight(),
     BaseTilt(),
     NominalBaseTilt(),
     PayloadChange(),

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
@@ -15,6 +17,8 @@ from scara_ident.effects.position import offset_of
 from scara_ident.effects.signals import Scene, Signals
 from scara_ident.model.terms import Column
 
+Part: TypeAlias = Literal["all", "coulomb", "viscous"]
+
 # Time constants tried, as shares of the longest run: 2.5 times apart, which refinement bridges.
 WARM_UP_SHARES = (0.06, 0.16, 0.4, 1.0)
 # A time constant above this many runs is not seen to end.
@@ -24,23 +28,44 @@ LARGEST_WARM_UP_SHARE = 3.0
 # Friction of a warming gear loses no more than this share of itself in a second. A lubricant loses some 3.5 % of its
 # viscosity by kelvin, so that a quarter takes 7 K/s: 3 kW of friction for each kilogram of steel.
 FASTEST_WARM_UP = 0.25
+# Least power of speed of what warms up, by the parts that a heated gear may lose: the grip of seals and preloaded bearings, the drag
+# of the lubricant, or both in one proportion.
+LEAST_POWER: dict[Part, float] = {"all": 0.0, "coulomb": 0.0, "viscous": 1.0}
+# What these parts are called.
+PARTS: dict[Part, str] = {
+    "all": "friction",
+    "coulomb": "Coulomb friction",
+    "viscous": "friction that grows with speed",
+}
 # A drift within this many standard deviations of none is an offset.
 DRIFT_STDS = 3.0
 
 
+@dataclass(frozen=True)
 class WarmUp(Effect):
     """Friction that is larger when a run starts: the steady friction times ``1 + share exp(-t/time_constant)``.
 
     The column is the friction that the present estimate predicts, times ``exp(-t/time_constant)``. An estimate made
     without the effect takes the mean over the run for the steady friction; with the estimate made with it, the
     coefficient is the share.
+
+    Where Coulomb friction alone falls so, or the friction that grows with speed alone, and that explains more than chance makes, it
+    is by that: the share is of that part, and ``speed_power`` 0 or 1 is among the parameters, the least power of speed that
+    warms up. Where two laws explain as much, parameters are no surer than what they differ by.
+
+    Attributes
+    ----------
+    part : {"all", "coulomb", "viscous"}
+        What of the friction warms up: as a whole, Coulomb friction, or what grows with speed.
     """
+
+    part: Part = "all"
 
     name = "warm_up"
     summary = "friction that falls as the run goes on"
     coefficients = (
         Coefficient(
-            "share", "1", "further friction of {joint} at the start of a run, as a share",
+            "share", "1", "further {part} of {joint} at the start of a run, as a share",
             "friction would be smaller when the run starts",
             LARGEST_WARM_UP_SHARE, f"friction would fall to less than a {1.0 + LARGEST_WARM_UP_SHARE:.0f}th in the run",
         ),
@@ -59,12 +84,13 @@ class WarmUp(Effect):
         return ((share * scene.duration,) for share in WARM_UP_SHARES)
 
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
-        """Return the predicted friction times ``exp(-t/time_constant)``."""
-        return [friction_torque(signals, member.place) * np.exp(-signals.time / member.nonlinear[0])]
+        """Return the predicted friction, or that part of it, times ``exp(-t/time_constant)``."""
+        friction = friction_torque(signals, member.place, self._places(signals.scene, member.place))
+        return [friction * np.exp(-signals.time / member.nonlinear[0])]
 
     def estimate_slopes(self, signals: Signals, member: Member, value: Array) -> EstimateSlopes:
         """Return those by the joint's friction."""
-        own = np.array(list(friction_places(signals.scene, member.place).values()))
+        own = np.array(list(self._places(signals.scene, member.place).values()), dtype=np.intp)
         places, rows = some_slopes(predicted_slopes(signals, member.place), own)
         return {member.place: (places, value[0] * np.exp(-signals.time / member.nonlinear[0]) * rows)}
 
@@ -78,6 +104,27 @@ class WarmUp(Effect):
             return f"friction would fall faster than by {FASTEST_WARM_UP:.0%} a second, which no gear warms up by"
         late = member.nonlinear[0] > LONGEST_WARM_UP * scene.duration
         return "the recordings are too short to see it end" if late else None
+
+    def other_laws(self) -> tuple[Effect, ...]:
+        """Return the families by which other parts of the friction warm up."""
+        return tuple(WarmUp(part) for part in LEAST_POWER if part != self.part)
+
+    def law(self) -> Mapping[str, Parameter]:
+        """Return the least power of speed that warms up, where it is not friction as a whole."""
+        return {} if self.part == "all" else {"speed_power": Parameter(LEAST_POWER[self.part], 0.0, "1")}
+
+    def description(self, scene: Scene, member: Member) -> str:
+        """Add what of the friction warms up, where it is not the whole."""
+        return super().description(scene, member) + ("" if self.part == "all" else f": {PARTS[self.part]} alone")
+
+    def words(self, scene: Scene, member: Member) -> dict[str, Any]:
+        """Add what of the friction warms up."""
+        return {**super().words(scene, member), "part": PARTS[self.part]}
+
+    def _places(self, scene: Scene, joint: int) -> dict[int, int]:
+        """Return where the friction that warms up stands among the base model's parameters, by power of speed."""
+        own = friction_places(scene, joint)
+        return own if self.part == "all" else {k: own[k] for k in own if (k == 0) == (self.part == "coulomb")}
 
 
 class OffsetDrift(Effect):

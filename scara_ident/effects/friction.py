@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -43,12 +43,13 @@ def friction_of(scene: Scene, joint: int) -> dict[int, float]:
     return {power: float(scene.value[place]) for power, place in friction_places(scene, joint).items()}
 
 
-def friction_torque(signals: Signals, joint: int) -> Array:
-    """Return the friction of a joint as the present estimate predicts it, recorded side, shape (N,)."""
+def friction_torque(signals: Signals, joint: int, powers: Collection[int] | None = None) -> Array:
+    """Return the friction of a joint as the present estimate predicts it, or some powers of speed of it, recorded side, shape (N,)."""
     v = signals.scene.robot.drive_sign[joint] * signals.motion.v[joint]
     torque = np.zeros_like(v)
     for power, value in friction_of(signals.scene, joint).items():
-        torque += value * np.sign(v) * np.abs(v) ** power
+        if powers is None or power in powers:
+            torque += value * np.sign(v) * np.abs(v) ** power
     return np.asarray(torque)
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from functools import lru_cache
+from typing import ClassVar
 
 import numpy as np
 
@@ -10,8 +12,10 @@ from scara_ident.arrays import Array
 from scara_ident.effects.effect import Effect
 from scara_ident.effects.parameters import Coefficient, Member, Parameter, View, deviation
 from scara_ident.effects.signals import Scene, Signals
+from scara_ident.model.base_parameters import constant_torques, standard_regressor
 from scara_ident.model.terms import Column
 from scara_ident.model.terms.friction import Offset
+from scara_ident.robot.robot import Robot
 
 
 class Spring(Effect):
@@ -23,7 +27,7 @@ class Spring(Effect):
 
     name = "spring"
     summary = "a spring, such as a cable or hose"
-    coefficients = (
+    coefficients: ClassVar[tuple[Coefficient, ...]] = (
         Coefficient(
             "stiffness", "{torque}/{position}", "stiffness of a spring on {joint}",
             "it would push away from its rest position",
@@ -80,6 +84,62 @@ class Spring(Effect):
         told = ", whose rest position holds if the joint has no torque offset"
         return self.summary + ("" if offset_of(scene, member.place) is None else told)
 
+    def or_else(self, scene: Scene, member: Member, value: Array) -> str:
+        """Say what else it may be on a joint that goes up and down."""
+        weight = abs(weight_along(scene.robot).get(member.place, 0.0)) * abs(scene.robot.row_scale[member.place])
+        if not weight:
+            return ""
+        return f"; or a rope, chain or cable of {float(value[0]) / weight:.3g} kg/m that hangs heavier the higher the joint is"
+
+
+class RopeWeight(Spring):
+    """A rope, chain or cable that hangs on a joint which goes up and down, the more of it the lower the joint is.
+
+    Its torque is that of a mass ``-mass_per_length h`` on the joint, h the height, which a spring of negative stiffness would have: so
+    no spring explains it. A rope over a pulley leaves one side and comes onto the other, where a counterweight hangs: its mass per length
+    then counts twice. What hangs at position zero is part of the weight that the joint carries. One that hangs heavier the higher
+    the joint is, as a chain that lies on the floor, is a spring: no position tells the two apart.
+    """
+
+    name = "rope_weight"
+    summary = "a rope, chain or cable that hangs heavier on the joint the lower it is"
+    coefficients = (
+        Coefficient(
+            "mass_per_length", "kg/m", "mass that comes onto {joint} as it goes down, by its way",
+            "it would hang lighter the lower it is, as on a spring",
+        ),
+    )  # fmt: skip
+    watched = False
+    view = View("position")
+    experiment = "hold still, or creep, at heights over the whole range; weigh a length of the rope, chain or cable"
+    not_simulated = "the virtual arm's springs pull to where they rest"
+
+    def joints(self, scene: Scene) -> list[int]:
+        """Return the joints that go up and down wherever the arm is."""
+        lifts = weight_along(scene.robot)
+        return [j for j in super().joints(scene) if j in lifts]
+
+    def columns(self, scene: Scene, member: Member) -> tuple[Column, ...]:
+        """Describe the mass per length; a constant weight is the bodies'."""
+        return super(Spring, self).columns(scene, member)
+
+    def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
+        """Return minus the position times the weight of 1 kg."""
+        j, robot = member.place, signals.scene.robot
+        return [-abs(weight_along(robot)[j]) * robot.row_scale[j] * signals.motion.q[j]]
+
+    def parameters(self, scene: Scene, member: Member, value: Array, covariance: Array) -> Mapping[str, Parameter]:
+        """Return the mass per length."""
+        return {"mass_per_length": Parameter(float(value[0]), deviation(covariance), "kg/m")}
+
+    def description(self, scene: Scene, member: Member) -> str:
+        """Say that over a pulley it counts twice."""
+        return self.summary + " (twice its mass per length where it runs over a pulley to a counterweight)"
+
+    def or_else(self, scene: Scene, member: Member, value: Array) -> str:
+        """Return nothing: no spring does this."""
+        return ""
+
 
 def offset_of(scene: Scene, joint: int) -> int | None:
     """Return the place of the joint's torque offset among the model's columns, None without one."""
@@ -87,3 +147,11 @@ def offset_of(scene: Scene, joint: int) -> int | None:
     if offset is None or joint not in offset.places:
         return None
     return int(scene.model.place(offset).start) + offset.places.index(joint)
+
+
+@lru_cache(maxsize=8)
+def weight_along(robot: Robot) -> Mapping[int, float]:
+    """Return what holds 1 kg on each joint that goes up and down wherever the arm is, N in its positive direction, by its place."""
+    rest = np.zeros((robot.n, 1))
+    columns = standard_regressor(robot, rest, rest, rest)[:, :, 0]
+    return {j: float(columns[j, 10 * j]) for j in constant_torques(robot)}

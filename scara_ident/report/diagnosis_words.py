@@ -80,7 +80,7 @@ def sentences(diagnosis: Diagnosis) -> tuple[str, ...]:
         on = f"depends on {' and '.join(remainder.signals)}" if remainder.signals else "repeats from run to run"
         found.append(
             f"Unexplained: on {remainder.joint} a remainder of {remainder.rms:.3g} {unit} rms {on}; "
-            f"no effect of the catalogue accounts for it{_curved(diagnosis, remainder)}."
+            f"no effect of the catalogue accounts for it{_as_no_arm(diagnosis, remainder)}{_curved(diagnosis, remainder)}."
         )
         if not remainder.signals:
             found += [f"To do first: {step.sentence()}" for step in next_steps(diagnosis)[:1]]
@@ -124,6 +124,20 @@ def _curved(diagnosis: Diagnosis, remainder: Unexplained) -> str:
     if straight and remainder.signals == (f"velocity of {remainder.joint}",):
         return ", but the model's friction is straight in speed: try --model complete"
     return ""
+
+
+def _as_no_arm(diagnosis: Diagnosis, remainder: Unexplained) -> str:
+    """Return which effect goes as the remainder does, with coefficients that no arm has, if one does; else nothing."""
+    found = diagnosis.search
+    like = [
+        item
+        for item in found.decisions
+        if item.as_no_arm >= found.step.criteria.nearly_all and item.candidate.joint(found.scene) == remainder.joint
+    ]
+    if not like:
+        return ""
+    best = max(like, key=lambda item: item.as_no_arm)
+    return f"; it goes as {best.label} does, which removes {best.as_no_arm:.0%} of what is left there, squared, but {best.why}"
 
 
 def _undecided(diagnosis: Diagnosis) -> str:

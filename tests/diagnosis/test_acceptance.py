@@ -213,3 +213,16 @@ def test_one_of_few_trajectories_does_not_outvote_what_removes_most(
     fold_gains: tuple[float | None, ...], gain: float, accepted: bool
 ):
     assert decided(SPRING, replace(GOOD, fold_gains=fold_gains), 100, gain=gain).accepted is accepted
+
+
+def test_what_goes_as_an_effect_that_no_arm_has_is_kept_with_its_gain():
+    """A spring that pushes removed 94 % of what repeated, and the sentence said that filters may leave as much."""
+    pushing = replace(GOOD, value=np.array([-0.05, 0.0]), tested=np.array([-0.05, 0.0]))
+    assert decided(SPRING, pushing, 100, 0.94).as_no_arm == pytest.approx(0.94)
+    assert decided(SPRING, GOOD, 100, 0.94).as_no_arm == 0.0
+    for change in ({"p_value": 0.01}, {"outside": 1e-9}, {"fold_gains": (0.5, -0.1, -0.1, None)}):
+        assert decided(SPRING, replace(pushing, **change), 100, 0.4).as_no_arm == 0.0
+    # One coefficient alone has no gain and no significance, and is kept all the same.
+    alone = replace(pushing, value=np.array([-0.5]), tested=np.array([-0.5]), covariance=np.array([[1e-6]]))
+    loss = decided(Candidate(TransmissionLoss(), Member(0, (0.5,))), alone, 100, 0.94)
+    assert (loss.gain, loss.as_no_arm) == (0.0, pytest.approx(0.94))

@@ -7,7 +7,8 @@ import pytest
 
 from scara_ident.effects import EffectTerm, Member, Signals
 from scara_ident.effects.drift import OffsetDrift, WarmUp
-from scara_ident.effects.friction import friction_torque
+from scara_ident.effects.following import slopes_by_differences
+from scara_ident.effects.friction import friction_of, friction_torque
 from scara_ident.robot.robot import load_robot
 from tests.effects.scenes import columns, moving, scene_of
 
@@ -27,6 +28,40 @@ def test_time_counts_from_the_start_of_each_recording():
     friction = friction_torque(Signals(scene, item), 1)
     warm = columns(WarmUp(), scene, item, Member(1, (4.0,)))[1, 0]
     assert warm == pytest.approx(friction * np.exp(-(item.time + 2.0) / 4.0))
+
+
+def test_a_part_of_the_friction_warms_up_alone():
+    scene, item, member = scene_of(load_robot()), moving(load_robot(), 0.5), Member(1, (4.0,))
+    whole, dry, drag = (columns(WarmUp(part), scene, item, member)[1, 0] for part in ("all", "coulomb", "viscous"))
+    assert dry + drag == pytest.approx(whole)
+    coulomb = friction_of(scene, 1)[0]
+    assert np.abs(dry) == pytest.approx(coulomb * np.exp(-item.time / 4.0))
+    assert [set(family.other_laws()) for family in (WarmUp(), WarmUp("coulomb"))] == [
+        {WarmUp("coulomb"), WarmUp("viscous")},
+        {WarmUp("all"), WarmUp("viscous")},
+    ]
+    assert WarmUp().law() == {}
+    for part, power, word in (("coulomb", 0.0, "Coulomb friction alone"), ("viscous", 1.0, "grows with speed alone")):
+        assert WarmUp(part).law()["speed_power"].value == power
+        assert word in WarmUp(part).description(scene, member)
+        assert "Coulomb" in WarmUp(part).columns(scene, member)[0].meaning or part == "viscous"
+
+
+@pytest.mark.parametrize("part", ["all", "coulomb", "viscous"])
+def test_what_is_unsure_of_a_part_of_the_friction_is_said_as_differences_say_it(part):
+    scene, item, member = scene_of(load_robot()), moving(load_robot(), 0.5), Member(1, (4.0,))
+    signals, value = Signals(scene, item), np.array([0.7])
+    (said, by_differences) = (
+        found[1]
+        for found in (
+            WarmUp(part).estimate_slopes(signals, member, value),
+            slopes_by_differences(WarmUp(part), signals, member, value),
+        )
+    )
+    dense = np.zeros((2, len(scene.value), item.samples))
+    for own, (places, rows) in zip(dense, (said, by_differences), strict=True):
+        own[places] = rows
+    assert dense[0] == pytest.approx(dense[1], abs=1e-6 * np.abs(dense[1]).max())
 
 
 def test_a_drift_stays_within_the_torque_limit():

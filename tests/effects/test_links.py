@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
@@ -35,6 +36,7 @@ from scara_ident.robot.robot import Robot, load_robot
 from tests.arms import example_urdf, rnea
 from tests.effects.carried import carrying, heavier
 from tests.effects.scenes import moving, scene_of
+from tests.effects.test_position import lift
 
 
 def test_the_tool_of_the_scara_is_at_the_end_of_its_second_link():
@@ -173,9 +175,10 @@ def test_what_acts_on_links_lags_with_them_as_if_the_bodies_had_it(name: str):
 
 
 @pytest.mark.parametrize("effect", [x for x in CATALOGUE if x.of_position], ids=lambda item: type(item).__name__)
-def test_a_torque_that_is_of_the_position_knows_no_speed(effect: Effect):
+def test_a_torque_that_is_of_the_position_knows_no_speed(effect: Effect, tmp_path: Path):
     assert effect.on_links
-    robot = load_robot(example_urdf("ur5_robot.urdf"))
+    # No joint of a UR5 goes up and down.
+    robot = lift(tmp_path) if effect.name == "rope_weight" else load_robot(example_urdf("ur5_robot.urdf"))
     scene, item, other = scene_of(robot), moving(robot, 0.1), moving(robot, 0.1, seed=3)
     members = effect.members(scene)
     assert members

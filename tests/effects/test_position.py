@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from scara_ident.effects import Member, Scene, Signals
-from scara_ident.effects.position import Spring
+from scara_ident.effects.position import RopeWeight, Spring
 from scara_ident.model.model import TorqueModel
 from scara_ident.model.terms.friction import Offset
+from scara_ident.robot.robot import Robot, load_robot
 from scara_ident.simulation import effects as fx
+from tests.arms import Link, write_urdf
 from tests.effects.scenes import columns, moving, scene_of
 from tests.effects.simulated import ARMS, arm_of, run, true_motion, true_scene
 from tests.simulation.made import left_over, scara
@@ -81,3 +84,54 @@ def test_a_gear_transmits_a_spring_that_rests_where_the_offset_says() -> None:
     bare = without_offset(scene)
     both = Spring().torque_on_links(Signals(bare, item), Member(1), np.array([0.05, 0.1]))
     assert both[1] == pytest.approx(0.05 * item.q[1] + 0.1)
+
+
+def lift(folder: Path, axis: tuple[float, float, float] = (0.0, 0.0, 1.0)) -> Robot:
+    """A carriage on a column, an arm that turns on it, and a slide on that."""
+    links = (
+        Link(kind="prismatic", axis=axis, mass=20.0),
+        Link(axis=(0.0, 0.0, 1.0), mass=8.0, com=(0.2, 0.0, 0.0)),
+        Link(kind="prismatic", axis=(1.0, 0.0, 0.0), mass=3.0),
+    )
+    return load_robot(write_urdf(folder / "lift.urdf", links))
+
+
+def test_only_what_goes_up_and_down_carries_a_rope(tmp_path: Path) -> None:
+    assert [member.joint for member in RopeWeight().members(scene_of(lift(tmp_path)))] == [0]
+    assert RopeWeight().members(scene_of(scara().robot)) == ()
+
+
+@pytest.mark.parametrize("axis", [(0.0, 0.0, 1.0), (0.0, 0.0, -1.0), (0.6, 0.0, 0.8)])
+@pytest.mark.parametrize("reduction", [1.0, -25.0])
+def test_a_rope_weighs_more_the_lower_its_joint_is(axis, reduction: float, tmp_path: Path) -> None:
+    """By the virtual work of its weight, m g dh, on the side of the effort and either way round."""
+    robot = lift(tmp_path, axis)
+    robot = replace(robot, reduction=np.array([reduction, 1.0, 1.0]), effort_side="motor")
+    scene, item = scene_of(robot), moving(robot, 0.5)
+    column = columns(RopeWeight(), scene, item, Member(0))[0, 0]
+    height = axis[2] * item.q[0]
+    hanging = -np.sign(axis[2]) * item.q[0]
+    assert column == pytest.approx(9.81 * axis[2] * hanging / reduction, rel=1e-3)
+    assert np.all(np.diff(hanging)[np.abs(np.diff(height)) > 0] * np.diff(height)[np.abs(np.diff(height)) > 0] < 0.0)
+    told = RopeWeight().parameters(scene, Member(0), np.array([4.0]), np.array([[0.04]]))["mass_per_length"]
+    assert (told.value, told.std, told.unit) == (4.0, pytest.approx(0.2), "kg/m")
+
+
+def test_of_rope_and_spring_one_at_the_most_is_possible(tmp_path: Path) -> None:
+    """What pushes a lift away from where it would rest removed 94 % and was no effect: `undecided`."""
+    scene, std = scene_of(lift(tmp_path)), np.array([0.1])
+    # The first with the other's force is impossible.
+    for one, other in ((Spring(), RopeWeight()), (RopeWeight(), Spring())):
+        assert one.inadmissible(scene, Member(0), np.array([5.0]), std) is None
+        assert other.inadmissible(scene, Member(0), np.array([-5.0]), std) is not None
+    assert "0.51 kg/m" in Spring().or_else(scene, Member(0), np.array([5.0]))
+    assert RopeWeight().or_else(scene, Member(0), np.array([5.0])) == ""
+    assert Spring().or_else(scene, Member(2), np.array([5.0])) == ""
+    assert "counterweight" in RopeWeight().description(scene, Member(0))
+
+
+def test_a_gear_transmits_the_weight_of_a_rope(tmp_path: Path) -> None:
+    scene, item = scene_of(lift(tmp_path)), moving(lift(tmp_path), 0.2)
+    found = RopeWeight().torque_on_links(Signals(scene, item), Member(0), np.array([2.0]))
+    assert found[0] == pytest.approx(-2.0 * 9.81 * item.q[0], rel=1e-3)
+    assert not np.any(found[1:])

@@ -16,6 +16,7 @@ from scara_ident.effects.signals import LinkTorque
 from scara_ident.export.traced_model import TracedArray, trace_model, traced
 from scara_ident.model.model import TorqueModel
 from scara_ident.model.regressor.tracing import Scalar, Trace, compile_program
+from tests.effects.test_position import lift
 from tests.export.arms import scara, ur5
 from tests.export.identified import identified, model_torque, states
 
@@ -33,7 +34,7 @@ def evaluated(model, values: tuple[Scalar, ...], motion) -> np.ndarray:
 @pytest.mark.parametrize("effect", OF_STATE, ids=lambda effect: f"{type(effect).__name__} {getattr(effect, 'way', '')}")
 def test_every_effect_of_the_state_is_recorded_as_it_is(effect: Effect, tmp_path: Path) -> None:
     tried = 0
-    for make in (scara, ur5):
+    for make in (scara, ur5, lift):
         robot = make(tmp_path)
         found = identified(robot, (effect.name,), samples=60)
         if not any(term.name == effect.name for term in found.model.terms):

@@ -13,6 +13,7 @@ from scara_ident.diagnosis.held_out_gain import HeldOutGain
 from scara_ident.diagnosis.next_steps import next_steps
 from scara_ident.diagnosis.outcome import Unexplained
 from scara_ident.effects import Parameter
+from scara_ident.effects.position import Spring
 from scara_ident.report.diagnosis import diagnosis_dict
 from scara_ident.report.diagnosis_words import quantity, sentences
 from scara_ident.robot.robot import load_robot
@@ -126,3 +127,12 @@ def test_where_what_is_left_depends_on_no_signal_it_is_said_what_to_do_first(res
     assert said[place + 1] == f"To do first: {next_steps(left)[0].sentence()}"
     shown = replace(left, unexplained=Unexplained("joint1", ("position of joint1",), 0.1, 0.5))
     assert not any(words.startswith("To do first") for words in sentences(shown))
+
+
+def test_what_is_unexplained_is_said_to_go_as_an_effect_that_no_arm_has():
+    """A force that pushed away from rest, told to 1e-80, stood in the table of candidates alone."""
+    runs = with_torque(exact_runs(), 0, lambda motion: -0.3 * motion.q[0])
+    found = diagnose(load_robot(), runs, bands=BANDS, catalogue=(Spring(),))
+    said = next(item for item in sentences(found) if item.startswith("Unexplained"))
+    assert "it goes as spring of joint1 does" in said
+    assert "it would push away from its rest position" in said
