@@ -13,7 +13,8 @@ from scara_ident.estimation.tail import clusters
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.kinematics import place_of
 from scara_ident.robot.robot import Robot
-from scara_ident.use.contact_force import LEAST_JOINTS, STRONG, ContactForce, contact_force
+from scara_ident.use.contact_force import LEAST_JOINTS, ContactForce, contact_force
+from scara_ident.use.contact_samples import STRONG
 from scara_ident.use.external_torque import FEATURES, Observed
 from scara_ident.use.observer import ContactObserver
 

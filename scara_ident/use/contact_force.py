@@ -8,13 +8,14 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.robot.kinematics import (
+    UNFELT,
     constant_force,
     force_covariance,
-    leaning_torques,
     place_of,
     told_at_once,
     tool_placement,
 )
+from scara_ident.use.contact_samples import ContactSamples, contact_samples
 from scara_ident.use.external_torque import Observed
 from scara_ident.use.observer import ContactObserver
 
@@ -23,8 +24,6 @@ from scara_ident.use.observer import ContactObserver
 FITS, LEAST_JOINTS = 0.75, 3
 # Of a direction of the force that is told so much worse than another at once, none is told.
 LEAST_TOLD = 0.03
-# States of a contact at which the Jacobian is taken, and the share of its peak from which on they are fitted.
-STATES, STRONG = 80, 0.5
 # Probability that a force where it is said to act is refused for what it leaves of the torque.
 REFUSED = 0.01
 # Force and point of a contact are six numbers, told by so many joints.
@@ -64,25 +63,6 @@ class ContactForce:
     point_std: Array | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class _Strong:
-    """The samples of a contact that are fitted, of each joint in units of its threshold.
-
-    Attributes
-    ----------
-    torques : ndarray, shape (N, n)
-    rows : ndarray, shape (N, n, 3, 4)
-        Of `leaning_torques`, as the observer shows them.
-    scatter : ndarray, shape (n, n)
-        Second moments of the torque without contact. They are those of every sample alike: the residual changes slowly, so that
-        no mean lessens it.
-    """
-
-    torques: Array
-    rows: Array
-    scatter: Array
-
-
 def contact_force(
     observer: ContactObserver, observed: Observed, threshold: Array, inside: Array, strong: Array
 ) -> ContactForce:
@@ -104,7 +84,7 @@ def contact_force(
         Samples of the contact, and those of them that are fitted.
     """
     robot = observer.known.robot
-    fitted = _strong(observer, observed, threshold, inside, strong)
+    fitted = contact_samples(observer, observed, threshold, inside, strong)
     at_tool = fitted.rows[..., 0]
     force, explained = constant_force(at_tool, fitted.torques)
     told = told_at_once(at_tool, observer.felt) >= LEAST_TOLD
@@ -134,35 +114,20 @@ def contact_force(
     return ContactForce(explained, False, beside.force, beside.covariance[:3, :3], origin + turn @ beside.point, std)
 
 
-def _strong(observer: ContactObserver, observed: Observed, threshold: Array, inside: Array, strong: Array) -> _Strong:
-    places = inside[:: max(1, len(inside) // STATES)]
-    states = (observer.external.arm.configuration(observed.position[:, k]) for k in places)
-    share = 1.0 - np.exp(-2.0 * np.pi * observer.settings.bandwidth * np.diff(observed.time[places]))
-    # At its begin as much of it has passed the low-pass as of the largest torque.
-    size = np.max(np.abs(observed.torque[:, inside]) / threshold[:, inside], axis=0)
-    share = np.concatenate([size[:1] / np.max(size), share])
-    rows, torques, seen = [], [], np.zeros(())
-    for k, turned, new in zip(places, leaning_torques(observer.known.robot, states), share, strict=True):
-        seen = seen + new * (turned - seen)
-        if k in strong:
-            rows.append(seen / threshold[:, k, None, None])
-            torques.append(observed.torque[:, k] / threshold[:, k])
-    usual = np.mean(threshold[:, strong], axis=1)
-    scatter = observer.scatter.covariance(np.mean(observed.features[:, :, strong], axis=2))
-    return _Strong(np.array(torques), np.array(rows), scatter / usual[:, None] / usual)
-
-
 def _leaves_noise(row: Array, torque: Array, unsure: Array) -> bool:
-    """Whether the best of all forces leaves of a torque (n,), by a row (n, 3), what its covariance (n, n) does."""
+    """Whether the best of all forces leaves of a torque (n,), by a row (n, 3), what its covariance (n, n) does.
+
+    A direction that is told little is one of the best force's too: of a strong force it is more than noise.
+    """
     from scipy.special import chdtrc
 
     half = np.linalg.inv(np.linalg.cholesky(unsure))
-    force, _, rank, _ = np.linalg.lstsq(half @ row, half @ torque, rcond=LEAST_TOLD)
+    force, _, rank, _ = np.linalg.lstsq(half @ row, half @ torque, rcond=UNFELT)
     freedom = len(torque) - int(rank)
     return freedom == 0 or float(chdtrc(freedom, np.sum((half @ (torque - row @ force)) ** 2))) >= REFUSED
 
 
-def _unsure(fitted: _Strong, left: Array) -> Array:
+def _unsure(fitted: ContactSamples, left: Array) -> Array:
     """Return the covariance (n, n) of a torque of which a force leaves (N, n).
 
     What the force does not explain since it is not constant is taken for the same throughout, as the residual is.
@@ -191,7 +156,7 @@ class _Beside:
     likely: bool
 
 
-def _beside_tool(fitted: _Strong, unsure: Array, force: Array, point: Array | None = None) -> _Beside:
+def _beside_tool(fitted: ContactSamples, unsure: Array, force: Array, point: Array | None = None) -> _Beside:
     """Return the most likely force and point, by steps of Gauss and Newton from a force on the tool or a point."""
     from scipy.special import chdtrc
 

@@ -61,8 +61,9 @@ def test_stated_forces_are_as_sure_as_they_say(observer: ContactObserver):
                 stds.append(std)
     assert len(off) >= 10
     assert np.mean(np.abs(off) < 2.0) > 0.9
-    # And no less sure than that by far: thresholds are some times what the residual usually is.
-    assert np.sqrt(np.mean(np.square(off))) > 0.2
+    # And no less sure than that by far, though it counts what another point on the link would make of it, and the residual as
+    # if it were the same throughout.
+    assert np.sqrt(np.mean(np.square(off))) > 0.1
     assert np.median(stds) < 0.2 * 60.0
 
 
