@@ -91,14 +91,25 @@ def within_a_step(step: SelectionStep, candidate: Candidate) -> str | None:
     steps = max((part[joint][0] or 0.0 for parts in noise_sizes(data) for part in parts), default=0.0)
     if way < steps:
         return f"it turns on {way:.2g} {unit}, less than a step of the encoder, {steps:.2g} {unit}"
-    parts = (part for recording in data.recordings for part in recording.stretches)
-    stepping = max(float(stepping_speeds(part.stretch, part.motion.cuts)[joint]) for part in parts)
+    changes = np.concatenate([_changes_at_turns(part.motion.v[joint]) for part in data.stretches])
+    passed = float(np.sqrt(np.mean(changes**2))) if len(changes) else 0.0
+    if speed < passed:
+        return (
+            f"friction would be another one below {speed:.2g} {unit}/s, which the joint passes within a sample as it turns: "
+            f"from one to the next it gains {passed:.2g} {unit}/s"
+        )
+    stepping = max(float(stepping_speeds(part.stretch, part.motion.cuts)[joint]) for part in data.stretches)
     if speed < STEPS_OF_SPEED * stepping:
         return (
             f"friction would be another one below {speed:.2g} {unit}/s, where a controller that answers the encoder's steps shakes the joint: "
             f"below {stepping:.2g} {unit}/s these come one by one"
         )
     return None
+
+
+def _changes_at_turns(v: Array) -> Array:
+    """Return by how much a speed changes from the last sample before each turn to the first one behind it."""
+    return np.asarray(np.diff(v)[np.signbit(v[1:]) != np.signbit(v[:-1])])
 
 
 def _gone_further_down(step: SelectionStep, decision: Decision) -> str | None:

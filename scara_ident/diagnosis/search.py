@@ -304,7 +304,9 @@ def scene_of(model: TorqueModel, value: Array, observations: Observations) -> Sc
         longest = max(longest, float(time[-1] - time[0]))
         travel = np.maximum(travel, np.ptp(item.recording.position, axis=1))
     for part in data.stretches:
-        speed = np.maximum(speed, np.max(np.abs(part.motion.v), axis=1))
+        # What a servo trembles by that holds its joint is no motion of it.
+        speed = np.maximum(speed, np.where(part.stretch.idle, 0.0, np.max(np.abs(part.motion.v), axis=1)))
+    travel[speed == 0.0] = 0.0
     slowest = float(min(part.rate for part in data.stretches))
     band = max((band for band in data.bands if band is not None), default=HIGHEST_CUT * slowest)
     scene = Scene(model, value, longest, slowest, band, travel, speed, start, columns=columns_at_hand(observations))

@@ -58,6 +58,10 @@ class BehindGear(Effect):
     in_small_ways = True
     follows_estimate = True
 
+    def joints(self, scene: Scene) -> list[int]:
+        """Return those that move in some recording: of one that is held all the while nothing is known of its link."""
+        return [j for j in super().joints(scene) if scene.speed[j] > 0.0]
+
     def geared_joint(self, member: Member) -> int:
         """Return its joint."""
         return member.place

@@ -155,6 +155,19 @@ def test_friction_that_is_another_one_where_steps_come_one_by_one_is_not_believe
     assert (f"below {stepping:.2g} rad/s these come one by one" in (said or "")) == hidden
 
 
+def test_friction_that_is_another_one_where_a_joint_passes_within_a_sample_is_not_believed() -> None:
+    """Delays that differ by run, corrected to half a millisecond, made friction that jumps grow over 0.01 rad/s, at 250 Hz."""
+    step = step_beside(exact_runs())
+    changes = np.concatenate(
+        [noise_check._changes_at_turns(part.motion.v[1]) for part in step.observations.data.stretches]
+    )
+    passed = float(np.sqrt(np.mean(changes**2)))
+    assert len(changes) and passed > 0.0
+    for share, hidden in ((0.8, True), (1.3, False)):
+        (decision,) = step.judge([Candidate(SmoothCoulomb(), Member(1, (share * passed,)))])
+        assert ("passes within a sample" in (noise_objection(step, decision) or "")) == hidden
+
+
 def answering(runs: list[Recording], gains: dict[int, float], size: float) -> list[Recording]:
     """The runs with noise in the positions of joints, and a controller's answer to it in these joints' torque."""
     rng, made = np.random.default_rng(5), []
