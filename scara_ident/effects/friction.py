@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -63,8 +63,51 @@ def friction_slope(signals: Signals, joint: int) -> Array:
     return np.asarray(slope * signals.scene.robot.drive_sign[joint])
 
 
+def not_all_of_coulomb(
+    scene: Scene, joint: int, value: Array, std: Array, builds_up: str, smallest: float, largest: float
+) -> str | None:
+    """Say so where what builds up is surely less or more than these shares of the Coulomb friction that then slides."""
+    coulomb = friction_of(scene, joint).get(0)
+    if coulomb is None:
+        return None
+    if value[0] + DOUBT_STDS * std[0] < smallest * max(coulomb, 0.0):
+        return f"only a small part of the Coulomb friction would build up {builds_up}; all of it does"
+    if value[0] - DOUBT_STDS * std[0] > largest * max(coulomb, 0.0):
+        return f"it would be more than {largest:g} times the Coulomb friction"
+    return None
+
+
+class AtLowSpeed(Effect):
+    """Friction that is another one below a velocity."""
+
+    nonlinear = (NonlinearParameter("velocity", "{position}/s", 1e-4, 5.0),)
+    of_state = True
+    view = View("velocity")
+    experiment = "run at eight or more constant speeds, spaced by a constant factor down to creeping"
+    # Velocities tried, as shares of the joint's largest speed.
+    shares: ClassVar[tuple[float, ...]] = ()
+
+    def scan(self, scene: Scene, joint: int) -> Iterable[tuple[float, ...]]:
+        """Return shares of the joint's largest speed."""
+        return ((share * float(scene.speed[joint]),) for share in self.shares)
+
+    def limits(self, scene: Scene, member: Member) -> tuple[tuple[float, float], ...]:
+        """Return shares of the largest speed of a joint that slides, whose speeds may be those of a stage or of a gantry."""
+        if not scene.robot.prismatic[member.place]:
+            return super().limits(scene, member)
+        speed = float(scene.speed[member.place])
+        return ((SLOWEST_STRIBECK * speed, speed),)
+
+    def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
+        """Say so where the joint is never fast against the velocity."""
+        wrong = super().inadmissible(scene, member, value, std)
+        if wrong is None and member.nonlinear[0] > WIDEST_STRIBECK * scene.speed[member.place]:
+            return "the joint is never fast against this speed"
+        return wrong
+
+
 @dataclass(frozen=True)
-class Stribeck(Effect):
+class Stribeck(AtLowSpeed):
     """More friction at low speed: ``u = amplitude sign(v) exp(-(v/velocity)^2)``.
 
     Armstrong-Helouvry, Dupont, Canudas de Wit (1994), "A survey of models, analysis tools and compensation methods",
@@ -87,21 +130,7 @@ class Stribeck(Effect):
             "amplitude", "{torque}", "further friction of {joint} near rest", "friction would fall towards rest"
         ),
     )
-    nonlinear = (NonlinearParameter("velocity", "{position}/s", 1e-4, 5.0),)
-    of_state = True
-    view = View("velocity")
-    experiment = "run at eight or more constant speeds, spaced by a constant factor down to creeping"
-
-    def scan(self, scene: Scene, joint: int) -> Iterable[tuple[float, ...]]:
-        """Return shares of the joint's largest speed."""
-        return ((share * float(scene.speed[joint]),) for share in STRIBECK_SHARES)
-
-    def limits(self, scene: Scene, member: Member) -> tuple[tuple[float, float], ...]:
-        """Return shares of the largest speed of a joint that slides, whose speeds may be those of a stage or of a gantry."""
-        if not scene.robot.prismatic[member.place]:
-            return super().limits(scene, member)
-        speed = float(scene.speed[member.place])
-        return ((SLOWEST_STRIBECK * speed, speed),)
+    shares = STRIBECK_SHARES
 
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
         """Return ``sign(v) exp(-|v/velocity|^exponent)``."""
@@ -126,8 +155,6 @@ class Stribeck(Effect):
         wrong = super().inadmissible(scene, member, value, std)
         if wrong is not None:
             return wrong
-        if member.nonlinear[0] > WIDEST_STRIBECK * scene.speed[member.place]:
-            return "the joint is never fast against this speed"
         coulomb = friction_of(scene, member.place).get(0)
         if coulomb is not None and value[0] - DOUBT_STDS * std[0] > LARGEST_STRIBECK_SHARE * max(coulomb, 0.0):
             return f"it would be more than {LARGEST_STRIBECK_SHARE:g} times the Coulomb friction"

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
-from scara_ident.effects.effect import DOUBT_STDS, Effect
-from scara_ident.effects.friction import friction_of
+from scara_ident.effects.effect import Effect
+from scara_ident.effects.friction import not_all_of_coulomb
 from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, Parameter, View, deviation
 from scara_ident.effects.signals import Scene, Signals
 
@@ -69,12 +69,9 @@ class Presliding(Effect):
             return wrong
         if member.nonlinear[0] > LONGEST_SHARE * scene.travel[member.place]:
             return "over so long a way it is a spring, not friction"
-        coulomb = friction_of(scene, member.place).get(0)
-        if coulomb is not None and value[0] + DOUBT_STDS * std[0] < SMALLEST_COULOMB_SHARE * max(coulomb, 0.0):
-            return "only a small part of the Coulomb friction would build up over a distance; all of it does"
-        if coulomb is not None and value[0] - DOUBT_STDS * std[0] > LARGEST_COULOMB_SHARE * max(coulomb, 0.0):
-            return f"it would be more than {LARGEST_COULOMB_SHARE:g} times the Coulomb friction"
-        return None
+        return not_all_of_coulomb(
+            scene, member.place, value, std, "over a distance", SMALLEST_COULOMB_SHARE, LARGEST_COULOMB_SHARE
+        )
 
     def turns_on(self, member: Member) -> tuple[float, float]:
         """Return the distance: where a reversal is must be known better."""
