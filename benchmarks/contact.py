@@ -10,6 +10,7 @@ of pushes is by logistic regression on its logarithm. The table says of each rat
 ``yes`` and ``no`` where the whole interval is, ``seen`` and ``open`` where only what was counted is, or is not.
 
     python benchmarks/contact.py --robot ur5 --seed 11 --output benchmarks/results/contact_ur5.json
+    python benchmarks/contact.py --robot ur5 --effects transmission_loss:elbow_joint:loss_coefficient=0.1
     python benchmarks/contact.py --measured DATA/ur10e --fit ident_50s_12harm ident_50s_14harm_noload --rates 300 500
 """
 
@@ -29,9 +30,11 @@ from scipy.optimize import minimize
 from scipy.stats import chi2
 from virtual_motions import KINDS, random_motion
 
-from scara_ident import Recording, identify, load_robot, read_recordings, simulate, virtual_arm
+from scara_ident import Recording, diagnose, identify, load_robot, read_recordings, simulate, virtual_arm
+from scara_ident.effects.catalogue import effects_named
 from scara_ident.export.identified_model import IdentifiedModel, identified_model
 from scara_ident.robot.kinematics import tool_frame
+from scara_ident.simulation import Effect, parse_effect
 from scara_ident.simulation.arm import VirtualArm
 from scara_ident.simulation.effects.contact import Push
 from scara_ident.use.alarm import step_of
@@ -49,8 +52,33 @@ LASTING, APART, AFTER = 0.6, 3.5, 0.3
 FORCES = {"scara03": (3.0, 150.0), "ur5": (0.02, 5.0), "panda": (0.02, 5.0), "measured": (2.0, 150.0)}
 # Thresholds are from a half of the quiet motion, and from recordings of so many seconds in all.
 SHORT = 600.0
+# Samples between those at which usual thresholds are taken.
+EVERY = 100
 # By how much a rate may be wrong.
 FACTOR = 1.5
+
+
+class Rig(NamedTuple):
+    """A virtual arm, what it has that its URDF has not, and whether the model that is watched by does not know it."""
+
+    arm: VirtualArm
+    seed: int
+    effects: tuple[Effect, ...] = ()
+    unaware: bool = False
+
+    def record(self, k: int, pushes: Sequence[Push] = ()) -> Recording:
+        """Record a random motion, with the velocity that the controller saw."""
+        motion = random_motion(f"m{k}", self.arm, KINDS[k % len(KINDS)], SECONDS, np.random.default_rng([self.seed, k]))
+        # Other noise with every seed.
+        acting, seed = (*self.effects, *pushes), 1_000_000 * self.seed + k
+        return simulate(self.arm, motion, effects=acting, seed=seed, rate=RATE, record_velocity=True).recording
+
+    def known(self, recordings: list[Recording]) -> IdentifiedModel:
+        """Identify the arm, or diagnose it for what it has."""
+        if self.unaware or not self.effects:
+            return identified_model(identify(self.arm.robot, recordings))
+        families = effects_named(*sorted({effect.name for effect in self.effects}))
+        return identified_model(diagnose(self.arm.robot, recordings, catalogue=families))
 
 
 class Aim(NamedTuple):
@@ -81,6 +109,8 @@ def main() -> None:
     parser.add_argument(
         "--beside", type=float, default=0.0, help="how far from the tool, or a link's origin, pushes act, m"
     )
+    parser.add_argument("--effects", nargs="+", type=parse_effect, default=[], help="what the arm has, as `simulate` takes it; its model is then a diagnosis' for these families")  # fmt: skip
+    parser.add_argument("--unaware", action="store_true", help="take the model of `identify` all the same")
     parser.add_argument("--link", help="link that is pushed, by default the tool's")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--measured", type=Path, help="folder with robot.yaml and recordings")
@@ -92,20 +122,20 @@ def main() -> None:
         found = measured(given.measured, given.fit, given.seed, given.rates)
     else:
         aim = Aim(given.link, given.beside)
-        found = virtual(given.robot, given.recordings, given.pushed, given.seed, given.rates, aim)
+        arm = virtual_arm(load_robot(None if given.robot == "scara03" else given.robot))
+        rig = Rig(arm, given.seed, tuple(given.effects), given.unaware)
+        found = virtual(rig, given.recordings, given.pushed, given.rates, aim)
     print("\n".join(table(found)))
     if given.output:
         given.output.parent.mkdir(parents=True, exist_ok=True)
         given.output.write_text(json.dumps(found, indent=1) + "\n")
 
 
-def virtual(
-    name: str, count: int, pushed_count: int, seed: int, rates: Sequence[float], aim: Aim = AT_TOOL
-) -> dict[str, Any]:
+def virtual(rig: Rig, count: int, pushed_count: int, rates: Sequence[float], aim: Aim = AT_TOOL) -> dict[str, Any]:
     """Count on a virtual arm."""
-    arm = virtual_arm(load_robot(None if name == "scara03" else name))
-    made = [record(arm, seed, k) for k in range(6 + count)]
-    known = identified_model(identify(arm.robot, made[:6]))
+    arm, seed, name = rig.arm, rig.seed, rig.arm.robot.name
+    made = [rig.record(k) for k in range(6 + count)]
+    known = rig.known(made[:6])
     observer = contact_observer(known, made[6:], rate=PUSH_RATE)
     runs = [observer.observe(item) for item in made[6:]]
     few = max(1, round(SHORT / SECONDS))
@@ -119,16 +149,17 @@ def virtual(
         pushes = [
             aimed(drawn(arm, rng, start, FORCES[name]), arm, aim, rng) for start in np.arange(2.0, SECONDS - 2.0, APART)
         ]
-        pushed, without = (observer.observe(record(arm, seed, 20_000 + k, with_)) for with_ in (pushes, ()))
+        pushed, without = (observer.observe(rig.record(20_000 + k, with_)) for with_ in (pushes, ()))
         tries += looked_for(observer, pushed, without, pushes)
-    return {"arm": name, "false_alarms": rows, **smallest(tries)}
+    return {"arm": name, "false_alarms": rows, "thresholds": thresholds(observer, runs), **smallest(tries)}
 
 
-def record(arm: VirtualArm, seed: int, k: int, pushes: Sequence[Push] = ()) -> Recording:
-    """Record a random motion, with the velocity that the controller saw."""
-    motion = random_motion(f"m{k}", arm, KINDS[k % len(KINDS)], SECONDS, np.random.default_rng([seed, k]))
-    # Other noise with every seed.
-    return simulate(arm, motion, effects=pushes, seed=1_000_000 * seed + k, rate=RATE, record_velocity=True).recording
+def thresholds(observer: ContactObserver, runs: Sequence[Observed]) -> dict[str, float]:
+    """Return the usual threshold of each joint at `PUSH_RATE`, N m or N: the median over the time."""
+    every = [
+        observer.alarm.threshold(run.features[:, :, k]) for run in runs for k in np.flatnonzero(run.settled)[::EVERY]
+    ]
+    return dict(zip(observer.known.robot.joints, np.median(every, axis=0).tolist(), strict=True))
 
 
 def drawn(arm: VirtualArm, rng: np.random.Generator, start: float, forces: tuple[float, float]) -> Push:
@@ -179,6 +210,9 @@ def table(found: dict[str, Any]) -> list[str]:
         cells = (found["arm"], rested, f"{row['stated']:.0f}", seen, f"{row['ratio']:.2f}", count, said, force)
         lines.append(f"| {' | '.join(cells)} |")
         force = ""
+    if "thresholds" in found:
+        each = ", ".join(f"{name} {value:.3g}" for name, value in found["thresholds"].items())
+        lines.append(f"{found['arm']}: thresholds at {PUSH_RATE:g} an hour: {each}")
     if found["placed_at_tool"] is not None:
         lines.append(f"{found['arm']}: {found['placed_at_tool']:.0%} of the pushes found were placed at the tool")
     if found["forces"]:

@@ -129,10 +129,9 @@ class Effect(ABC):
 
     def regressor(self, signals: Signals, member: Member) -> Array:
         """Return the columns of a member, shape (n, k, N), on the side of the recorded torque."""
-        columns = self._named(signals, member)
-        result = np.zeros((signals.scene.robot.n, len(columns), signals.motion.samples))
-        for k, column in enumerate(columns):
-            result[member.place if np.ndim(column) == 1 else slice(None), k] = column
+        result = np.zeros((signals.scene.robot.n, len(self.columns(signals.scene, member)), signals.motion.samples))
+        for joint, columns in self.by_joint(signals, member).items():
+            result[joint] = columns
         return result
 
     def by_joint(self, signals: Signals, member: Member) -> dict[int, list[Array]]:
@@ -319,6 +318,10 @@ class Effect(ABC):
 
         It then depends on the effects in the model with `on_links` too.
         """
+        return None
+
+    def passes_on(self, member: Member, value: Array, driving: float) -> float | None:
+        """Return the share of a drive's torque that reaches links, driving from 1, them, to -1, driven by them; None for all."""
         return None
 
     def tie(self, scene: Scene, member: Member) -> Tie | None:

@@ -89,6 +89,11 @@ class TransmissionLoss(Effect):
         j, gain = member.place, self._has_gain * second_order(member.nonlinear[0])
         return [np.abs(swinging_load(signals, j)) * signals.sign[j] + gain * signals.load(j)]
 
+    def passes_on(self, member: Member, value: Array, driving: float) -> float:
+        """Return the inverse of its law: of a torque that the motor sees beyond its rotor and friction it names what is transmitted."""
+        share = float(value[0])
+        return 1.0 / (1.0 + self._has_gain * second_order(share) * share + share * driving)
+
     def tie(self, scene: Scene, member: Member) -> Tie:
         """Return the share that is lost."""
         bodies = len(scene.model.rigid_body.columns)

@@ -8,11 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from scara_ident.arrays import Array
+from scara_ident.effects import EffectTerm
 from scara_ident.errors import UsageError
 from scara_ident.export.identified_model import IdentifiedModel
 from scara_ident.model.terms import Friction, Offset, RigidBody, Term
 from scara_ident.motion.motion import Motion
 from scara_ident.recording.audit.samples import GAP_STEPS
+from scara_ident.use.lossy_gears import LossyGears, is_lossy
 from scara_ident.use.momentum import arm_momentum
 
 # Cut-off of the observer, and of the low-pass on positions and efforts where velocities are not given, Hz.
@@ -54,7 +56,7 @@ class ExternalTorque:
 
     The momentum p of links and rotors obeys ``dp/dt = u - u_f + C^T v - g + u_ext``; the observer's residual is ``u_ext``
     after a first-order low-pass (De Luca and Mattone 2005). It is integrated over each step by the mean of its ends, and
-    the low-pass exactly, so that any step is stable.
+    the low-pass exactly, so that any step is stable. Of a gear's loss see `LossyGears`.
 
     Parameters
     ----------
@@ -84,7 +86,7 @@ class ExternalTorque:
         self._gain = 2.0 * np.pi * settings.bandwidth
         self._friction, self._offset = np.zeros((4, robot.n)), np.zeros(robot.n)
         self._others: list[tuple[Term, Array]] = []
-        left_out = []
+        gears, left_out = [], []
         for term in known.model.terms:
             value = known.value[known.model.place(term)]
             if isinstance(term, Friction):
@@ -93,12 +95,15 @@ class ExternalTorque:
                     self._friction[power] = robot.drive_sign * value[k :: len(term.powers)]
             elif isinstance(term, Offset):
                 self._offset = term.of_joints(value)
+            elif isinstance(term, EffectTerm) and is_lossy(term, value):
+                gears.append((term, value))
             elif not isinstance(term, RigidBody):
                 if _of_position_and_velocity(term, robot.n):
                     self._others.append((term, value))
                 else:
                     left_out.append(term.name)
         self.left_out = tuple(left_out)
+        self._gears = LossyGears(robot, gears, settings.differentiator) if gears else None
         self.reset()
 
     def reset(self) -> None:
@@ -109,6 +114,8 @@ class ExternalTorque:
         self._seen: Array | None = None
         self._slopes = np.zeros((2, self.robot.n))
         self._slow_rate = np.zeros(self.robot.n)
+        if self._gears is not None:
+            self._gears.reset()
 
     def update(self, q: Array, v: Array | None, effort: Array, step: float) -> Array:
         """Take one sample and return `torque`.
@@ -131,17 +138,21 @@ class ExternalTorque:
         square = v * v
         coefficients = self._friction
         friction = self._offset + v * (coefficients[1] + square * coefficients[3])
-        friction += np.minimum(1.0, np.maximum(-1.0, v / self._rest)) * (coefficients[0] + square * coefficients[2])
+        along = np.minimum(1.0, np.maximum(-1.0, v / self._rest))
+        friction += along * (coefficients[0] + square * coefficients[2])
         for term, value in self._others:
             friction += _torque_of(term, value, q, v)
         # Everything on the recorded side.
         momentum = self._scale * momentum
-        force = effort - friction + self._scale * change
+        drive, lost = effort - friction, self._none
+        if self._gears is not None:
+            drive, lost = self._gears.update(drive, q, v, along, step)
+        force = drive + self._scale * change
         share, rate = 1.0, self._none
         if self._before is not None:
             share = -math.expm1(-self._gain * step)
             rate = (momentum - self._before[0]) / step
-            self.torque = self.torque + share * (rate - 0.5 * (force + self._before[1]) - self.torque)
+            self.torque = self.torque + share * (rate - lost - 0.5 * (force + self._before[1]) - self.torque)
         self._before = momentum, force
         features = (1.0 - share) * self.features
         features[self._rows, np.add.reduce(v > self._edges, axis=0)] += share

@@ -185,3 +185,15 @@ def test_what_no_gear_can_have_is_refused():
 def test_the_rotors_share_of_an_inertia_matters_on_its_own_joint():
     assert TransmissionLoss().geared_joint(Member(1, (0.15,))) == 1
     assert {member.joint for member in TransmissionLoss().members(scene_of(load_robot()))} == {0, 1}
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_what_a_gear_passes_on_is_its_law_the_other_way_round(order: Literal[1, 2]):
+    effect, member, load = TransmissionLoss(order), Member(0, (SHARE,)), 3.0
+    # The motor sees 1/eta of the load where it drives and eta where it is driven, by eta = sqrt(1 + c^2) - c.
+    eta = np.sqrt(1.0 + SHARE**2) - SHARE
+    seen = {1.0: load / eta, -1.0: load * eta} if order == 2 else {1.0: load * 1.2, -1.0: load * 0.8}
+    for driving, torque in seen.items():
+        assert effect.passes_on(member, np.array([SHARE]), driving) * torque == pytest.approx(load, rel=1e-12)
+    still = effect.passes_on(member, np.array([SHARE]), 0.0)
+    assert min(1.0, still) > effect.passes_on(member, np.array([SHARE]), 1.0)
