@@ -102,13 +102,15 @@ class OnlineIdentifier:
         UsageError
             If the shapes are not these, or velocity or acceleration are given with a band.
         """
-        shape = self._buffer.shape[1:]
-        sample = np.empty(shape)
+        row = self._buffer[self._filled]
         for place, (name, signal) in enumerate(self._given(q, v, a, effort)):
-            if np.shape(signal) != shape[1:]:
-                raise UsageError(f"online: {name} of shape {np.shape(signal)}; expected {shape[1:]}")
-            sample[place] = signal
-        found = self._take(sample[None])
+            if np.shape(signal) != row.shape[1:]:
+                raise UsageError(f"online: {name} of shape {np.shape(signal)}; expected {row.shape[1:]}")
+            row[place] = signal
+        if not self._lost and np.isfinite(row).all():
+            self._filled += 1
+            return self._absorb() if self._filled == len(self._buffer) else None
+        found = self._take(row[None].copy())
         return found[0] if found else None
 
     def update_block(self, q: Array, v: Array | None, a: Array | None, effort: Array) -> list[Alarm]:
@@ -185,7 +187,7 @@ class OnlineIdentifier:
             "torque_noise": np.array([self._noise.squares, self._noise.counted]),
             "position_noise": np.array([self._position_noise.squares, self._position_noise.counted]),
             "counts": np.array([self._filled, self._samples, self._seen, self._lost]),
-            "buffer": self._buffer,
+            "buffer": self._buffer[: self._filled],
             "noise": np.asarray(self.noise, dtype=float),
             "settings": np.array(json.dumps(asdict(self.settings))),
             "names": np.array(self.model.names),
@@ -220,7 +222,7 @@ class OnlineIdentifier:
         found._averages = Averages(state["vector"], state["scores"], state["information"])
         found._noise, found._position_noise = noise
         found._filled, found._samples, found._seen, found._lost = (int(x) for x in state["counts"])
-        found._buffer[:] = state["buffer"]
+        found._buffer[: found._filled] = state["buffer"]
         return found
 
     @property
