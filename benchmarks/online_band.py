@@ -24,7 +24,10 @@ from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import load_robot
 from scara_ident.simulation import virtual_arm
 
+# Noise as a share of the torque, the load as one of the arm's mass, and seconds that are made at a time.
 NOISE_SHARE, PAYLOAD, STRETCH = 0.05, 0.05, 300.0
+# Runs of each case; alarms asked for in an hour, so many that some hours tell their rate.
+AGREEMENT_RUNS, PAYLOAD_RUNS, STATED = 3, 5, 10.0
 
 
 @dataclass(frozen=True)
@@ -176,6 +179,6 @@ def band(hours: float, seed: int) -> None:
     """Print what becomes of each case."""
     for case in CASES:
         print(case, flush=True)
-        agreement(case, 8, seed)
-        payload(case, 10, seed)
-        alarms(case, hours, seed, 10.0)
+        agreement(case, AGREEMENT_RUNS, seed)
+        payload(case, PAYLOAD_RUNS, seed)
+        alarms(case, hours, seed, STATED)
