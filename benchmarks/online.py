@@ -1,7 +1,8 @@
 """Identification beside a controller: updates a second, how soon a payload is seen, and how far apart false alarms are.
 
-Run ``python benchmarks/online.py [--hours H] [--seed S] [--only speed|alarms|payload]``. False alarms are counted in noise
-alone, asked for once in an hour, over many runs side by side (`benchmarks/online_lanes.py`).
+Run ``python benchmarks/online.py [--hours H] [--seed S] [--only speed|alarms|payload|band]``. False alarms are counted in noise
+alone, asked for once in an hour, over many runs side by side (`benchmarks/online_lanes.py`). With a band positions are rounded as
+encoders do and nothing else is given but torques (`benchmarks/online_band.py`).
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import os
 import time
 
 import numpy as np
+from online_band import band
 from online_lanes import Lanes, blocks_of
 
 from scara_ident.effects.links import point_mass, tool_of
@@ -140,7 +142,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--hours", type=float, default=100.0)
     parser.add_argument("--seed", type=int, default=3)
-    parser.add_argument("--only", choices=("speed", "alarms", "payload"))
+    parser.add_argument("--only", choices=("speed", "alarms", "payload", "band"))
     options = parser.parse_args()
     for name in (None, "panda") if options.only in (None, "speed") else ():
         speed(name)
@@ -148,6 +150,8 @@ def main() -> None:
         payload(PAYLOAD_RUNS, options.seed)
     if options.only in (None, "alarms"):
         false_alarms(options.hours, options.seed)
+    if options.only == "band":
+        band(options.hours, options.seed)
 
 
 if __name__ == "__main__":

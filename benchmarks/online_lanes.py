@@ -16,7 +16,8 @@ from scara_ident.model.model import TorqueModel
 from scara_ident.motion.motion import Motion
 from scara_ident.online import OnlineSettings
 from scara_ident.online.detector import TOLD, threshold
-from scara_ident.online.identifier import GIVEN_SAMPLES, NOISE_SAMPLES, REST_SHARE
+from scara_ident.online.identifier import REST_SHARE
+from scara_ident.online.noise import GIVEN_SAMPLES, NOISE_SAMPLES
 from scara_ident.online.state import Memory
 from scara_ident.online.suspects import suspects_of
 

@@ -1,5 +1,7 @@
 """Identification beside a running controller: a sample in, parameters at any time, and a word when something changes."""
 
-from scara_ident.online.identifier import Alarm, OnlineIdentifier, OnlineSettings
+from scara_ident.online.detector import Alarm
+from scara_ident.online.identifier import OnlineIdentifier
+from scara_ident.online.settings import OnlineSettings
 
 __all__ = ["Alarm", "OnlineIdentifier", "OnlineSettings"]

@@ -23,6 +23,33 @@ WIDENING = 1.3
 TOLD = 1e-6
 
 
+@dataclass(frozen=True)
+class Alarm:
+    """Something changed.
+
+    Attributes
+    ----------
+    sample : int
+        Samples taken in when it was seen; it is told a window later, when more is known of what it is.
+    effect : str
+        The likeliest: ``friction``, ``torque_scale`` or ``payload_change``.
+    joint : str or None
+    size : float
+        How large it would be alone, averaged over the detector's window: less than the whole.
+    unit : str
+        "1" for a share.
+    strength : float
+        Square of the averaged score's length over the threshold.
+    """
+
+    sample: int
+    effect: str
+    joint: str | None
+    size: float
+    unit: str
+    strength: float
+
+
 @dataclass(frozen=True, eq=False)
 class Averages:
     """Averaged scores.

@@ -14,108 +14,22 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from scara_ident.arrays import Array
+from scara_ident.arrays import Array, runs_of
 from scara_ident.errors import UsageError
 from scara_ident.estimation.information import triangular
 from scara_ident.files import write_whole
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.motion import Motion
-from scara_ident.online.detector import Averages, threshold
-from scara_ident.online.state import Forgetting, Memory
+from scara_ident.online.detector import Alarm, Averages, threshold
+from scara_ident.online.filtered import RowFilter
+from scara_ident.online.noise import GIVEN_ROWS, GIVEN_SAMPLES, PositionNoise, TorqueNoise
+from scara_ident.online.settings import OnlineSettings
+from scara_ident.online.state import Memory
 from scara_ident.online.suspects import Suspects, suspects_of
 from scara_ident.threads import one_blas_thread
 
 # A joint slower than this share of its velocity limit counts as at rest, where friction is unknown.
 REST_SHARE = 3e-3
-SIGNALS = ("position", "velocity", "acceleration", "effort")
-# Samples that the size of the noise is averaged over.
-NOISE_SAMPLES = 1e6
-# The given noise counts as this many samples, so that the first ones do not decide.
-GIVEN_SAMPLES = 1e3
-
-
-@dataclass(frozen=True)
-class OnlineSettings:
-    """How an online identification works.
-
-    Attributes
-    ----------
-    rate : float
-        Samples per second.
-    block : int
-        Samples absorbed together; a change is looked for after each block.
-    forgetting : {"directional", "exponential", "none"}
-        See `Memory.forgotten`.
-    memory : float
-        s after which what is old weighs 1/e, while the motion excites.
-    dependent : float
-        Samples that one independent sample stands for: 1 for white noise; of noise that passed a filter ``rate / (2 b)`` with
-        its noise bandwidth b, which is the integral of its squared gain over frequency, Hz: of a Butterworth filter of order n at B Hz
-        ``B x / sin(x)`` with ``x = pi / (2 n)``, of one of order 2 run both ways 0.83 B.
-    false_alarms : float
-        Of the detector, per hour of motion.
-    window : float
-        s that the detector averages over.
-    renewal : float
-        Weight of what is known once an alarm was raised, so that parameters follow what changed.
-    """
-
-    rate: float = 1000.0
-    block: int = 64
-    forgetting: Forgetting = "directional"
-    memory: float = 600.0
-    dependent: float = 1.0
-    false_alarms: float = 0.01
-    window: float = 0.5
-    renewal: float = 0.01
-
-    def __post_init__(self) -> None:
-        for name in ("rate", "block", "memory", "dependent", "false_alarms", "window"):
-            if not getattr(self, name) > 0:
-                raise UsageError(f"online: {name} is {getattr(self, name)}; expected a positive number")
-        if self.block != int(self.block):
-            raise UsageError(f"online: block is {self.block}; expected a whole number of samples")
-        if self.forgetting not in ("directional", "exponential", "none"):
-            raise UsageError(f"online: forgetting is {self.forgetting!r}; expected directional, exponential or none")
-        if not 0.0 < self.renewal <= 1.0:
-            raise UsageError(f"online: renewal is {self.renewal}; expected a weight above 0 and up to 1")
-
-    @property
-    def share(self) -> float:
-        """Weight of a new block in the detector's averages."""
-        return min(1.0, self.block / (self.rate * self.window))
-
-    @property
-    def blocks_between(self) -> float:
-        """Blocks between false alarms on average."""
-        return 3600.0 * self.rate / (self.block * self.false_alarms)
-
-
-@dataclass(frozen=True)
-class Alarm:
-    """Something changed.
-
-    Attributes
-    ----------
-    sample : int
-        Samples taken in when it was seen; it is told a window later, when more is known of what it is.
-    effect : str
-        The likeliest: ``friction``, ``torque_scale`` or ``payload_change``.
-    joint : str or None
-    size : float
-        How large it would be alone, averaged over the detector's window: less than the whole.
-    unit : str
-        "1" for a share.
-    strength : float
-        Square of the averaged score's length over the threshold.
-    """
-
-    sample: int
-    effect: str
-    joint: str | None
-    size: float
-    unit: str
-    strength: float
 
 
 @dataclass(eq=False)
@@ -126,7 +40,8 @@ class OnlineIdentifier:
     ----------
     model : TorqueModel
     noise : array_like, shape (n,)
-        Standard deviation of one sample of each joint's torque, as `wls` weighs by; a common factor is estimated.
+        Standard deviation of one sample of each joint's torque, as `wls` weighs by; a common factor is estimated. With a band that
+        of white noise which is as strong within it, and a factor is estimated for each joint.
     settings : OnlineSettings, optional
 
     Examples
@@ -155,23 +70,27 @@ class OnlineIdentifier:
         self._suspects: Suspects = suspects_of(self.model)
         self._causes = len(self._suspects.names)
         self._limit = threshold(self._causes, self.settings.share, self.settings.blocks_between)
-        self._keep = float(np.exp(-self.settings.block / (self.settings.rate * self.settings.memory)))
+        self._filter = self.settings.row_filter
         self._memory = Memory.empty(len(self.model.columns))
         self._averages = Averages.none(self._causes)
-        self._squares = self._counted = GIVEN_SAMPLES
-        self._buffer = np.zeros((self.settings.block, 4, joints))
-        self._filled = self._samples = self._seen = 0
+        given = (1, GIVEN_SAMPLES) if self._filter is None else (joints, GIVEN_ROWS)
+        self._noise = TorqueNoise.given(*given)
+        # Raw samples, or a block with nothing to filter.
+        shape = (int(self.settings.block), 4) if self._filter is None else (self._filter.window, 2)
+        self._buffer = np.zeros((*shape, joints))
+        self._position_noise = PositionNoise.none(joints)
+        self._filled = self._samples = self._seen = self._lost = 0
 
-    def update(self, q: ArrayLike, v: ArrayLike, a: ArrayLike, effort: ArrayLike) -> Alarm | None:
+    def update(self, q: ArrayLike, v: ArrayLike | None, a: ArrayLike | None, effort: ArrayLike) -> Alarm | None:
         """Take in one sample.
 
         Parameters
         ----------
         q, v, a : array_like, shape (n,)
-            Position, velocity and acceleration, in the order of the robot's joints; what is not measured is filtered
-            as the torque is.
+            Position, velocity and acceleration, in the order of the robot's joints. With a band the position is raw, and velocity
+            and acceleration are None: they are made of it.
         effort : array_like, shape (n,)
-            Torque on the recorded side. A sample with a number that is not finite is lost, and its time counts.
+            Torque on the recorded side, raw with a band. A sample with a number that is not finite is lost, and its time counts.
 
         Returns
         -------
@@ -181,51 +100,44 @@ class OnlineIdentifier:
         Raises
         ------
         UsageError
-            If the shapes are not these.
+            If the shapes are not these, or velocity or acceleration are given with a band.
         """
         row = self._buffer[self._filled]
-        for place, signal in enumerate((q, v, a, effort)):
+        for place, (name, signal) in enumerate(self._given(q, v, a, effort)):
             if np.shape(signal) != row.shape[1:]:
-                raise UsageError(f"online: {SIGNALS[place]} of shape {np.shape(signal)}; expected {row.shape[1:]}")
+                raise UsageError(f"online: {name} of shape {np.shape(signal)}; expected {row.shape[1:]}")
             row[place] = signal
-        if not np.isfinite(row).all():
-            self._samples += 1
-            return None
-        self._filled += 1
-        return self._absorb() if self._filled == len(self._buffer) else None
+        if not self._lost and np.isfinite(row).all():
+            self._filled += 1
+            return self._absorb() if self._filled == len(self._buffer) else None
+        found = self._take(row[None].copy())
+        return found[0] if found else None
 
-    def update_block(self, q: Array, v: Array, a: Array, effort: Array) -> list[Alarm]:
+    def update_block(self, q: Array, v: Array | None, a: Array | None, effort: Array) -> list[Alarm]:
         """Take in many samples, shape (n, N) each; the result is that of one after the other, bit for bit.
 
         Raises
         ------
         UsageError
-            If the shapes are not these.
+            If the shapes are not these, or velocity or acceleration are given with a band.
         """
-        found: list[Alarm] = []
-        shapes = {np.shape(signal) for signal in (q, v, a, effort)}
+        given = [signal for _, signal in self._given(q, v, a, effort)]
+        shapes = {np.shape(signal) for signal in given}
         if len(shapes) > 1 or len(shape := next(iter(shapes))) != 2 or shape[0] != self.model.robot.n:
             told = ", ".join(map(str, sorted(shapes)))
             raise UsageError(f"online: signals of shapes {told}; expected ({self.model.robot.n}, N) of each")
-        signals = np.array([q, v, a, effort], dtype=float)
-        finite = np.isfinite(signals).all(axis=(0, 1))
-        if not finite.all():
-            signals = signals[:, :, finite]
-            self._samples += int(np.count_nonzero(~finite))
-        start, count = 0, signals.shape[2]
-        while start < count:
-            size = min(count - start, len(self._buffer) - self._filled)
-            self._buffer[self._filled : self._filled + size] = signals[:, :, start : start + size].transpose(2, 0, 1)
-            self._filled += size
-            start += size
-            if self._filled == len(self._buffer) and (alarm := self._absorb()) is not None:
-                found.append(alarm)
-        return found
+        return self._take(np.array(given, dtype=float).transpose(2, 0, 1))
+
+    def gap(self) -> None:
+        """Say that the next sample does not follow the last one, as after a pause: with a band the filter begins anew."""
+        if self._filter is not None:
+            self._samples += self._filled + self._lost
+            self._filled = self._lost = 0
 
     @property
     def samples(self) -> int:
         """Samples taken in."""
-        return self._samples + self._filled
+        return self._samples + self._filled + self._lost
 
     @property
     def determined(self) -> bool:
@@ -234,7 +146,7 @@ class OnlineIdentifier:
 
     @property
     def value(self) -> Array:
-        """The parameters with all samples so far, shape (p,); NaN as long as one of them is undetermined."""
+        """The parameters with all samples so far, with a band all whole blocks, shape (p,); NaN as long as one is undetermined."""
         now = self._now()
         return now.value() if now.determined else np.full(now.parameters, np.nan)
 
@@ -272,9 +184,10 @@ class OnlineIdentifier:
             "vector": self._averages.vector,
             "scores": self._averages.scores,
             "information": self._averages.information,
-            "sums": np.array([self._squares, self._counted]),
-            "counts": np.array([self._filled, self._samples, self._seen]),
-            "buffer": self._buffer,
+            "torque_noise": np.array([self._noise.squares, self._noise.counted]),
+            "position_noise": np.array([self._position_noise.squares, self._position_noise.counted]),
+            "counts": np.array([self._filled, self._samples, self._seen, self._lost]),
+            "buffer": self._buffer[: self._filled],
             "noise": np.asarray(self.noise, dtype=float),
             "settings": np.array(json.dumps(asdict(self.settings))),
             "names": np.array(self.model.names),
@@ -299,6 +212,7 @@ class OnlineIdentifier:
             with np.load(path, allow_pickle=False) as held:
                 state = dict(held)
             names, settings = tuple(state["names"].tolist()), OnlineSettings(**json.loads(str(state["settings"])))
+            noise = TorqueNoise(*state["torque_noise"]), PositionNoise(*state["position_noise"])
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise UsageError(f"{path}: no state of an online identification ({type(error).__name__})") from None
         if names != model.names:
@@ -306,62 +220,129 @@ class OnlineIdentifier:
         found = cls(model, state["noise"], settings)
         found._memory = Memory(state["factor"])
         found._averages = Averages(state["vector"], state["scores"], state["information"])
-        found._squares, found._counted = (float(x) for x in state["sums"])
-        found._filled, found._samples, found._seen = (int(x) for x in state["counts"])
-        found._buffer[:] = state["buffer"]
+        found._noise, found._position_noise = noise
+        found._filled, found._samples, found._seen, found._lost = (int(x) for x in state["counts"])
+        found._buffer[: found._filled] = state["buffer"]
         return found
 
     @property
     def _scale(self) -> float:
-        """Variance of the noise, in units of what was given."""
-        return self._squares / self._counted
+        """Variance of the noise of rows, in units of what they were divided by."""
+        return float(self._noise.scale[0]) if self._filter is None else 1.0
 
     def _now(self) -> Memory:
         """Return the memory with what has not been absorbed yet."""
-        if not self._filled:
+        if self._filter is not None or not self._filled:
             return self._memory
         with one_blas_thread():
             return self._memory.absorbed(np.concatenate(self._rows()[0]))
 
-    def _rows(self) -> tuple[list[Array], int]:
-        """Return the triangular factors of the rows ``[W | u]`` of each joint in units of its noise, and their number.
+    def _rows(self) -> tuple[list[Array], Array]:
+        """Return the triangular factors of the rows ``[W | u]`` of each joint in units of its noise, and their numbers, (n,).
 
         Samples at rest count for nothing.
         """
-        q, v, a, effort = np.ascontiguousarray(self._buffer[: self._filled].transpose(1, 2, 0))
-        motion = Motion("online", "online", np.arange(float(self._filled)), q, v, a, None, self.settings.rate)
-        tables = [np.empty((len(own) + 1, self._filled)) for own in self.model.active]
-        self.model.joint_columns(motion, [table[:-1] for table in tables])
-        rows, moving, parameters = [], 0, len(self.model.columns)
-        for j, (own, table) in enumerate(zip(self.model.active, tables, strict=True)):
-            moves = np.abs(v[j]) > self._rest[j]
-            moving += int(np.count_nonzero(moves))
-            table[-1] = effort[j]
-            table *= np.where(moves, self._weight[j], 0.0)
-            factor = triangular(table.T)
+        tables, moving = self._sampled() if self._filter is None else self._filtered(self._filter)
+        rows, parameters = [], len(self.model.columns)
+        for own, table in zip(self.model.active, tables, strict=True):
+            factor = triangular(table)
             wide = np.zeros((len(factor), parameters + 1))
             wide[:, own], wide[:, -1] = factor[:, :-1], factor[:, -1]
             rows.append(wide)
         return rows, moving
 
+    def _sampled(self) -> tuple[list[Array], Array]:
+        """Return each joint's rows at every sample, shape (N, k + 1), and how many of them count."""
+        q, v, a, effort = np.ascontiguousarray(self._buffer[: self._filled].transpose(1, 2, 0))
+        motion = Motion("online", "online", np.arange(float(self._filled)), q, v, a, None, self.settings.rate)
+        tables = [np.empty((len(own) + 1, self._filled)) for own in self.model.active]
+        self.model.joint_columns(motion, [table[:-1] for table in tables])
+        moving = np.abs(v) > self._rest[:, None]
+        for table, torque, moves, weight in zip(tables, effort, moving, self._weight, strict=True):
+            table[-1] = torque
+            table *= np.where(moves, weight, 0.0)
+        return [table.T for table in tables], np.count_nonzero(moving, axis=1)
+
+    def _filtered(self, way: RowFilter) -> tuple[list[Array], Array]:
+        """Return the same of the rows that a filter makes."""
+        window = np.ascontiguousarray(self._buffer.transpose(1, 2, 0))
+        motion = way.motion(window)
+        self._position_noise = self._position_noise.after(window, motion, self._rest, way)
+        moving = way.moving(motion, np.maximum(self._rest, self._position_noise.rest(way)))
+        rows = way.rows(self.model, motion, moving, self._weight / np.sqrt(self._noise.scale))
+        return rows, np.array([len(own) for own in rows])
+
+    def _given(
+        self, q: ArrayLike, v: ArrayLike | None, a: ArrayLike | None, effort: ArrayLike
+    ) -> list[tuple[str, ArrayLike]]:
+        """Return the signals that are taken in, with their names."""
+        if self._filter is None:
+            return [("position", q), ("velocity", v), ("acceleration", a), ("effort", effort)]  # type: ignore[list-item]
+        for name, signal in (("velocity", v), ("acceleration", a)):
+            if signal is not None:
+                raise UsageError(f"online: {name} is given beside a band, in which positions tell it; give None")
+        return [("position", q), ("effort", effort)]
+
+    def _take(self, samples: Array) -> list[Alarm]:
+        """Take in samples, shape (N, signals, n), of which some may be lost."""
+        finite = np.all(np.isfinite(samples), axis=(1, 2))
+        if finite.all() and not self._lost:
+            return self._push(samples)
+        found, done = [], 0
+        for start, stop in runs_of(finite):
+            self._lost += start - done
+            found += self._bridge(samples[start]) + self._push(samples[start:stop])
+            done = stop
+        self._lost += len(samples) - done
+        return found
+
+    def _bridge(self, sample: Array) -> list[Alarm]:
+        """Put a straight line up to a sample, shape (signals, n), in the place of few lost ones before it, if a filter needs it."""
+        lost = self._lost
+        if self._filter is None:
+            self._samples, self._lost = self._samples + lost, 0
+        elif not self._filled or lost > self._filter.bridged:
+            self.gap()
+        elif lost:
+            last, share = self._buffer[self._filled - 1], np.arange(1, lost + 1) / (lost + 1)
+            self._lost = 0
+            return self._push(last + share[:, None, None] * (sample - last))
+        return []
+
+    def _push(self, samples: Array) -> list[Alarm]:
+        """Take in samples, shape (N, signals, n)."""
+        found, start = [], 0
+        while start < len(samples):
+            size = min(len(samples) - start, len(self._buffer) - self._filled)
+            self._buffer[self._filled : self._filled + size] = samples[start : start + size]
+            self._filled += size
+            start += size
+            if self._filled == len(self._buffer) and (alarm := self._absorb()) is not None:
+                found.append(alarm)
+        return found
+
     def _absorb(self) -> Alarm | None:
+        kept = 0
         try:
             with one_blas_thread():
                 each, moving = self._rows()
                 rows = np.concatenate(each)
-                old = self._memory.forgotten(self._keep, rows, self.settings.forgetting)
+                old = self._memory.forgotten(self.settings.keep, rows, self.settings.forgetting)
                 new = old.absorbed(rows)
-                alarm = self._innovated(old, new, each, moving) if moving and old.determined else None
+                alarm = self._innovated(old, new, each, moving) if moving.any() and old.determined else None
+            # What the next block needs too.
+            kept = len(self._buffer) - self.settings.new
+            self._buffer[:kept] = self._buffer[self.settings.new :].copy()
         finally:
             # Of a block that cannot be absorbed the next ones know nothing.
-            self._samples += self._filled
-            self._filled = 0
+            self._samples += self._filled - kept
+            self._filled = kept
         self._memory = new
         if alarm is not None:
             self.forget(self.settings.renewal)
         return alarm
 
-    def _innovated(self, old: Memory, new: Memory, each: Sequence[Array], moving: int) -> Alarm | None:
+    def _innovated(self, old: Memory, new: Memory, each: Sequence[Array], moving: Array) -> Alarm | None:
         """Take the innovations of a block into the noise and the averages, and look for a change."""
         value = old.value()
         parts = [rows[:, :-1] for rows in each]
@@ -371,9 +352,14 @@ class OnlineIdentifier:
         known = new.solved(left.T @ columns)
         products = left.T @ left - known.T @ known
         scale = self._scale
-        fade = max(0.0, 1.0 - moving / NOISE_SAMPLES)
-        self._squares = fade * self._squares + float(products[0, 0])
-        self._counted = fade * self._counted + moving / self.settings.dependent
+        if self._filter is None:
+            self._noise = self._noise.after(products[:1, 0], np.array([moving.sum()]), self.settings.dependent)
+        else:
+            # The sum over a joint's rows of e (V^-1 e): its mean is their number.
+            own = left[:, 0] * (left[:, 0] - columns @ new.solved_back(known[:, 0]))
+            starts = np.cumsum([0, *map(len, parts[:-1])])
+            squares = np.array([np.sum(own[a:b]) for a, b in zip(starts, [*starts[1:], None], strict=True)])
+            self._noise = self._noise.after(self._noise.scale * squares, moving, self.settings.dependent)
         share = self.settings.share
         self._averages = self._averages.after(products[1:, 0] / np.sqrt(scale), products[1:, 1:], share)
         strength = self._averages.length(share) / self._limit

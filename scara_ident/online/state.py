@@ -55,6 +55,12 @@ class Memory:
         # LAPACK itself: on factors this small SciPy's checks of what it is given take ten times as long.
         return np.asarray(dtrtrs(self.factor[:, :-1], rows.T, trans=1)[0])
 
+    def solved_back(self, column: Array) -> Array:
+        """Return ``A y`` of a column y, shape (p,), so that a row times it is the row's `solved` times y."""
+        from scipy.linalg.lapack import dtrtrs
+
+        return np.asarray(dtrtrs(self.factor[:, :-1], column)[0])
+
     def absorbed(self, rows: Array) -> Memory:
         """Return the memory with rows ``[W | u]``, shape (N, p + 1), added."""
         found = triangular(np.concatenate([self.factor, rows]))[: self.parameters]

@@ -100,14 +100,6 @@ def test_a_file_that_is_no_state_or_of_another_model_is_refused(tmp_path: Path):
         OnlineIdentifier.restore(tmp_path / "state.npz", build_model(load_robot()))
 
 
-@pytest.mark.parametrize(
-    "change", [{"rate": 0.0}, {"block": 1.5}, {"forgetting": "slow"}, {"renewal": 2.0}, {"false_alarms": -1.0}]
-)
-def test_settings_that_mean_nothing_are_refused(change):
-    with pytest.raises(UsageError, match="online"):
-        replace(SETTINGS, **change)
-
-
 @pytest.mark.parametrize("noise", [[0.1], [0.1, 0.0], [0.1, np.inf]])
 def test_noise_is_a_positive_number_for_each_joint(noise):
     with pytest.raises(UsageError, match="noise"):
@@ -141,9 +133,12 @@ def changed_torque(kind: str, states) -> np.ndarray:
     return torque(states, value, (1.0, 1.1) if kind == "torque_scale" else (1.0, 1.0), seed=9)
 
 
-@pytest.mark.parametrize(
+CHANGES = pytest.mark.parametrize(
     ("kind", "joint"), [("payload_change", None), ("friction", "joint2"), ("torque_scale", "joint2")]
 )
+
+
+@CHANGES
 def test_a_change_is_seen_within_a_second_of_motion_and_named(kind, joint):
     states = signals(9.0)
     part = round(7.0 * RATE)

@@ -22,6 +22,12 @@ def test_what_was_absorbed_in_parts_is_least_squares_of_all():
     np.testing.assert_allclose(memory.value(), np.linalg.lstsq(table[:, :-1], table[:, -1], rcond=None)[0], rtol=1e-12)
 
 
+def test_solving_back_goes_on_from_solving():
+    memory, new = Memory.empty(4).absorbed(rows(0)), rows(1)[:, :-1]
+    y = np.arange(4.0)
+    np.testing.assert_allclose(new @ memory.solved_back(y), memory.solved(new).T @ y, rtol=1e-10)
+
+
 def test_exponential_forgetting_weighs_what_is_old():
     memory = Memory.empty(4).absorbed(rows(0)).forgotten(0.5, rows(1), "exponential").absorbed(rows(1))
     table = np.vstack([np.sqrt(0.5) * rows(0), rows(1)])
