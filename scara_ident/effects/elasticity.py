@@ -120,6 +120,8 @@ class JointElasticity(BehindGear):
             return [np.zeros_like(signals.motion.q)]
         members = self._swinging(signals.scene, member)
         masses = TwoMasses(signals, members)
+        if not masses.held:
+            return [np.zeros_like(signals.motion.q)]
         stiffness = masses.stiffness[members.index(member)]
         if (self, member) in signals.scene.together:
             return [stiffness * masses.parts[members.index(member)]]

@@ -52,6 +52,9 @@ SMALL_LAG = 5e-3
 LEAST_SPRING = 0.1
 # The links' mass matrix, scaled to a diagonal of 1, has no smaller eigenvalue, however poor the estimate.
 LEAST_EIGENVALUE = 0.01
+# Radians (of a joint that slides as much of its travel, see `Scene.radian`): a link that lags by more has no gear, whose springs
+# are wound by milliradians, by a few tenths in arms with springs on purpose. Newton's steps from there end nowhere.
+MOST_LAG = 1.0
 # A swing at the beginning is followed until no more than this share is left of it, and then for so many periods of the band.
 FADED, FADED_PERIODS = 1e-6, 8.0
 
@@ -146,9 +149,22 @@ class TwoMasses:
         """The lags, the equations of the last of Newton's steps, and the motion that these are linear about if links lag there."""
         return self._kept("lag", self._made_lag)
 
+    @property
+    def held(self) -> bool:
+        """Whether gears hold their links, see `MOST_LAG`. No arm is otherwise, and lags are NaN then."""
+        return not bool(np.any(np.isnan(self.lag[0])))
+
+    def _within_gears(self, lag: Lag) -> bool:
+        # Not so either where they are NaN or infinite.
+        most = MOST_LAG * self.signals.scene.radian[self.joints]
+        return bool(np.all(np.max(np.abs(lag[0]), axis=1) <= most))
+
     def _made_lag(self) -> tuple[Lag, Swing, Signals | None]:
         signals, own, swing, links = self.signals, self.joints, self.swing, None
         lag = self._settled(swing, self._load(signals.rigid[own] + signals.on_links[own], signals.motion.a[own]))
+        unheld = np.full(lag[0].shape, np.nan)
+        if not self._within_gears(lag):
+            return (unheld, unheld, unheld), swing, None
         recorded = signals.motion.torque
         if self._initial is not None and recorded is not None:
             left = recorded[own] - signals.predicted[own] - signals.on_links[own] - self._on_own(lag, signals)
@@ -161,6 +177,8 @@ class TwoMasses:
             for slopes, part in zip(each, lag, strict=True):
                 load += times(slopes, part)
             lag = swing.solve(load, lag[0][:, :2])
+            if not self._within_gears(lag):
+                return (unheld, unheld, unheld), swing, None
             if self._initial is not None and recorded is not None:
                 left = recorded[own] - signals.predicted[own] - signals.on_links[own] - self._changed(lag)[own]
                 lag = self._initial.added(lag, self._initial.state(left, (lag[0], lag[1])))
@@ -196,10 +214,12 @@ class TwoMasses:
 
     @property
     def change(self) -> Array:
-        """Torque of all joints less that with rigid gears, recorded side, shape (n, N)."""
+        """Torque of all joints less that with rigid gears, recorded side, shape (n, N); 0 where these do not hold."""
         return self._kept("change", self._made_change)
 
     def _made_change(self) -> Array:
+        if not self.held:
+            return np.zeros_like(self.signals.motion.q)
         if _small(self.lag):
             return np.asarray(sum(self.parts))
         return self._changed(self.lag)
@@ -217,6 +237,8 @@ class TwoMasses:
 
     def _made_parts(self) -> list[Array]:
         x, first, second = self.lag
+        if not self.held:
+            return [np.zeros_like(self.signals.motion.q) for _ in self.joints]
         if _small(self.lag):
             return [lagging(self.signals, j, (x[a], first[a], second[a])) for a, j in enumerate(self.joints)]
         found, before = [], self.signals.rigid + self.signals.on_links
@@ -234,6 +256,8 @@ class TwoMasses:
         member by the parameters of the rigid bodies. To them comes what its coefficient takes away in turn, see `Tie`: so
         the sums over all members are the derivatives of `change`, whatever is shared out between them.
         """
+        if not self.held:
+            return
         scene, motion, own = self.signals.scene, self.signals.motion, self.joints
         term, carrier = scene.model.rigid_body, place == 0
         (x, first, second), swing, lagging_links = self._solved

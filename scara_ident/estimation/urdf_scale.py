@@ -119,15 +119,46 @@ def slight_joints(estimate: Estimate, observations: Observations) -> tuple[str, 
     return tuple(joint for joint, own in each.items() if max(own.torque, own.nominal) < SLIGHT * most[units[joint]])
 
 
-def braked_joints(estimate: Estimate) -> tuple[str, ...]:
-    """Return the joints whose Coulomb friction surely brakes: there efforts have the sign of the positions."""
-    model, found = estimate.model, []
+@dataclass(frozen=True)
+class FrictionSides:
+    """Joints whose friction surely takes energy out, as it does, and those where it surely feeds energy in.
+
+    Attributes
+    ----------
+    brakes : tuple of str
+        There efforts have the sign of the positions.
+    pushes : tuple of str
+        There they have not: one of the two counts backwards.
+    """
+
+    brakes: tuple[str, ...] = ()
+    pushes: tuple[str, ...] = ()
+
+
+def friction_sides(estimate: Estimate, observations: Observations) -> FrictionSides:
+    """Ask of each joint whether its friction brakes, by the energy that it takes over the recorded motion.
+
+    Of a law with several powers of the speed no coefficient need be sure where what they say together is.
+    """
+    model, brakes, pushes = observations.model, list[str](), list[str]()
+    known = ~estimate.undetermined & np.isfinite(estimate.std)
     for term in model.terms:
-        if isinstance(term, Friction) and 0 in term.powers:
-            own = range(len(estimate.value))[model.place(term)][term.powers.index(0) :: len(term.powers)]
-            pairs = zip(model.robot.joints, own, strict=True)
-            found += [joint for joint, k in pairs if estimate.value[k] > SURE * estimate.std[k]]
-    return tuple(found)
+        if not isinstance(term, Friction) or 1 not in term.powers:
+            continue
+        start, count = model.place(term).start, len(term.powers)
+        for j, (joint, rows) in enumerate(zip(model.robot.joints, observations.joints, strict=True)):
+            own = start + j * count + np.arange(count)
+            use = np.flatnonzero(np.isin(rows.columns, own) & known[rows.columns])
+            speed = rows.table[:-1][rows.columns == own[term.powers.index(1)]]
+            if not len(speed):
+                continue
+            places, taken = rows.columns[use], rows.table[use] @ speed[0]
+            # Of a covariance rounding may leave less than nothing along what is known best.
+            variance = max(0.0, float(taken @ estimate.covariance[np.ix_(places, places)] @ taken))
+            energy = float(taken @ estimate.value[places])
+            if abs(energy) > SURE * np.sqrt(variance):
+                (brakes if energy > 0.0 else pushes).append(joint)
+    return FrictionSides(tuple(brakes), tuple(pushes))
 
 
 def scale_sentence(
@@ -135,7 +166,7 @@ def scale_sentence(
     robot: Robot,
     unlike: Sequence[str] = (),
     slight: Sequence[str] = (),
-    braked: Sequence[str] = (),
+    friction: FrictionSides | None = None,
 ) -> str:
     """Say what scale recordings cannot tell, and how the URDF's compares, where scales are given.
 
@@ -148,10 +179,11 @@ def scale_sentence(
         See `unlike_urdf`.
     slight : sequence of str, optional
         See `slight_joints`: nothing is asked for their sake.
-    braked : sequence of str, optional
-        See `braked_joints`: a gain of the wrong sign is none of theirs.
+    friction : FrictionSides, optional
+        A gain of the wrong sign is none of a joint's that friction brakes.
     """
-    said = _compared(scales, robot, slight, braked)
+    friction = friction or FrictionSides()
+    said = _compared(scales, robot, slight, friction)
     if not scales or not unlike:
         return said
     return f"{said} On {', '.join(unlike)} they are not the URDF's in any scale."
@@ -166,9 +198,7 @@ def gravity_acts(robot: Robot) -> bool:
     return bool(np.max(np.abs(torques)) > ROUNDING * bodies)
 
 
-def _compared(
-    scales: Mapping[str, float] | None, robot: Robot, slight: Sequence[str], braked: Sequence[str] = ()
-) -> str:
+def _compared(scales: Mapping[str, float] | None, robot: Robot, slight: Sequence[str], friction: FrictionSides) -> str:
     geared = np.any(robot.reduction != 1.0)
     said = "No recording tells a scale common to all torques and masses"
     if gravity_acts(robot):
@@ -186,18 +216,12 @@ def _compared(
     if little and not shared:
         others = {joint: scale for joint, scale in scales.items() if joint not in little}
         few = ", ".join(f"{scale:.2g} times the URDF's on {joint}" for joint, scale in little.items())
-        begun = f"{_compared(others, robot, (), braked)} They" if others else f"{said}. Torques of the bodies"
+        begun = f"{_compared(others, robot, (), friction)} They" if others else f"{said}. Torques of the bodies"
         return f"{begun} are {few}, but so small there that a centre of mass a little off makes as much."
     size = np.array(list(scales.values()))
     turned = [joint for joint, scale in scales.items() if scale < 0.0]
     if turned:
-        said = f"{said}. Torques of the bodies have the opposite sign of the URDF's on {', '.join(turned)}"
-        if set(turned) <= set(braked):
-            return (
-                f"{said}, though friction brakes there, so that efforts have the sign of the positions: the centre of mass lies "
-                "elsewhere than in the URDF, or both count against the URDF's axis, or gravity has another direction."
-            )
-        return f"{said}: negate effort_gain there, or the axis, unless gravity has another direction."
+        return f"{said}. Torques of the bodies have the opposite sign of the URDF's on {_turned(turned, friction)}"
     middle = float(np.exp(np.median(np.log(size))))
     usual = (size > 1.0 / USUAL) & (size < USUAL)
     if np.all(usual):
@@ -214,6 +238,29 @@ def _compared(
         if not fits
     )
     return f"{said}. Torques of the bodies are {odd}: {asked}"
+
+
+def _turned(turned: Sequence[str], friction: FrictionSides) -> str:
+    """Name joints whose torques have the opposite sign, and say what that may be by what friction does there."""
+    pushed = [joint for joint in turned if joint in friction.pushes]
+    braked = [joint for joint in turned if joint in friction.brakes]
+    others = [joint for joint in turned if joint not in (*pushed, *braked)]
+    said = []
+    if pushed:
+        said.append(
+            f"{', '.join(pushed)}, and friction feeds energy in there: efforts or positions count backwards, negate effort_gain "
+            "or the position's scale."
+        )
+    if braked:
+        said.append(
+            f"{', '.join(braked)}, though friction brakes there, so that efforts have the sign of the positions: the centre of "
+            "mass lies elsewhere than in the URDF, or both count against the URDF's axis, or gravity has another direction."
+        )
+    if others:
+        said.append(
+            f"{', '.join(others)}: negate effort_gain there, or the axis, unless gravity has another direction."
+        )
+    return " They have it on ".join(said)
 
 
 def _alike(scales: Iterable[float]) -> bool:

@@ -17,7 +17,7 @@ from scara_ident.estimation.urdf_scale import (
     ALIKE,
     SURE,
     USUAL,
-    braked_joints,
+    friction_sides,
     scale_sentence,
     slight_joints,
     unlike_urdf,
@@ -56,7 +56,7 @@ def told_scale(estimate: Estimate, observations: Observations) -> str:
     unlike = [joint for joint in unlike_urdf(*seen) if joint not in loaded]
     # Where nothing else is compared that is no reason to say that nothing can be.
     compared = others if others or not loaded else None
-    said = scale_sentence(compared, observations.model.robot, unlike, slight, braked_joints(estimate))
+    said = scale_sentence(compared, observations.model.robot, unlike, slight, friction_sides(*seen))
     return f"{said} {_loaded_sentence(loaded, observations.model.robot)}" if loaded else said
 
 

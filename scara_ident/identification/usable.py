@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain
 
@@ -156,13 +156,15 @@ def with_rows(data: PreparedData, *, needed: bool) -> tuple[PreparedData, list[s
     kept = [k for k, count in enumerate(rows) if count >= LEAST_ROWS]
     if len(kept) == len(rows) or (needed and not kept):
         return data, []
-    notes = [
-        f"{item.recording.path or item.name}: {count} independent rows are left once the ends and the times at rest are left "
-        f"out{_because(item)}; left out"
+    said = (
+        (
+            str(item.recording.path or item.name),
+            f"{count} independent rows are left once the ends and the times at rest are left out{_because(item)}; left out",
+        )
         for item, count in zip(data.recordings, rows, strict=True)
         if count < LEAST_ROWS
-    ]
-    return data.of(kept), notes
+    )
+    return data.of(kept), _once(said)
 
 
 def _because(item: PreparedRecording) -> str:
@@ -191,16 +193,19 @@ def check_rows(observations: Observations) -> None:
 
 def data_notes(*data: PreparedData) -> list[str]:
     """Return what the audits found, the same remark on many recordings in one line, and where names contradict motions."""
-    found: dict[str, dict[str, list[str]]] = {}
     items = [item for part in data for item in part.recordings]
     audits = side_by_side(lambda item: audit_velocity(item.recording, item.longest.stretch), items)
-    for item in items:
-        for finding in item.recording.findings:
-            alike = found.setdefault(_NUMBER.sub("", finding.message), {})
-            alike.setdefault(finding.message, []).append(item.name)
-    notes = [note for alike in found.values() for note in _in_one(alike)]
+    notes = _once((item.name, finding.message) for item in items for finding in item.recording.findings)
     notes += _velocity_notes(items, audits)
     return [*notes, *(note for part in data for note in part.motions.notes)]
+
+
+def _once(said: Iterable[tuple[str, str]]) -> list[str]:
+    """Return remarks on recordings, each a name and what is said of it, the same remark on many in one line."""
+    found: dict[str, dict[str, list[str]]] = {}
+    for name, remark in said:
+        found.setdefault(_NUMBER.sub("", remark), {}).setdefault(remark, []).append(name)
+    return [note for alike in found.values() for note in _in_one(alike)]
 
 
 def _in_one(alike: Mapping[str, Sequence[str]]) -> list[str]:

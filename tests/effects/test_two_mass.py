@@ -290,3 +290,23 @@ def test_slopes_add_up_to_the_differences_of_what_all_links_do(recorded: bool):
             assert norm(own[place][:, 1 + which, inside] - expected) < near * norm(expected)
     expected = (change(scene.value, armature=1e-3) - change(scene.value, armature=-1e-3)) / 2e-3
     assert norm(own[0][:, 0, inside] - expected) < near * norm(expected)
+
+
+def test_a_link_that_lags_by_more_than_gears_give_has_no_elastic_gear():
+    """A wrist of which an estimate leaves the weight and next to no inertia: at a low frequency its spring held nothing, and lags grew until they overflowed."""
+    robot = load_robot("ur5")
+    scene, item = scene_of(robot), moving(robot)
+    names, value = list(scene.model.names), scene.value.copy()
+    value[names.index("mx6")] = 0.05
+    value[names.index("I6yy")] += 2e-5 - usual_link_inertia(replace(scene, value=value), 5)
+    scene = replace(scene, value=value)
+    assert 1e-5 < usual_link_inertia(scene, 5) < 1e-4
+    signals, effect = Signals(scene, item), JointElasticity()
+    with np.errstate(all="raise"):
+        loose = TwoMasses(signals, (Member(1, (8.0, 0.1)), Member(5, (2.0, 0.2))))
+        assert not loose.held and not list(loose.slopes(0))
+        assert not np.any(loose.change) and not np.any(loose.parts)
+        (columns,) = effect.signal_columns(signals, Member(5, (2.0, 0.2)))
+        assert not np.any(columns)
+    stiff = TwoMasses(signals, (Member(1, (8.0, 0.1)), Member(5, (200.0, 0.2))))
+    assert stiff.held and np.any(stiff.change)

@@ -11,7 +11,7 @@ import pytest
 from scara_ident.estimation import wls
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.estimation.urdf_scale import (
-    braked_joints,
+    friction_sides,
     gravity_acts,
     scale_sentence,
     slight_joints,
@@ -71,12 +71,36 @@ def test_where_friction_brakes_no_gain_of_opposite_sign_is_suspected(tmp_path):
     braked = replace(run, effort=-run.effort + 2.0 * np.sign(rate))
     observations = observe(model, prepare([braked], (8.0, 8.0)))
     estimate = wls(observations)
-    assert braked_joints(estimate) == robot.joints
+    assert friction_sides(estimate, observations).brakes == robot.joints
     said = told_scale(estimate, observations)
     assert "the opposite sign of the URDF's on j1, j2, though friction brakes there" in said
     assert "negate" not in said
     pushed = observe(model, prepare([replace(run, effort=-run.effort - 2.0 * np.sign(rate))], (8.0, 8.0)))
-    assert "on j1, j2: negate effort_gain there" in told_scale(wls(pushed), pushed)
+    said = told_scale(wls(pushed), pushed)
+    assert (
+        "on j1, j2, and friction feeds energy in there: efforts or positions count backwards, negate effort_gain"
+        in said
+    )
+
+
+def test_friction_brakes_by_all_of_its_law_together(tmp_path):
+    """An axis of an arm counts the other way round: of a law of four powers no coefficient was sure, and its effort was to be negated."""
+    robot = load_robot(write_urdf(tmp_path / "arm.urdf", PLANAR_2R))
+    run = noisy(swing(robot, seconds=8.0, rate=200.0), np.random.default_rng(1), 0.05)
+    rate = np.gradient(run.position, run.time, axis=1)
+    # The arm's own Coulomb friction away, and viscous friction in its place.
+    added = np.array([[0.4], [0.2]]) * np.sign(rate) + np.array([[-0.6], [0.6]]) * rate
+    observations = observe(
+        build_model(robot, "complete"), prepare([replace(run, effort=-run.effort + added)], (8.0, 8.0))
+    )
+    estimate = wls(observations)
+    coulomb = [estimate.model.names.index(name) for name in ("a01", "a02")]
+    assert np.all(np.abs(estimate.value[coulomb]) < 5.0 * estimate.std[coulomb])
+    found = friction_sides(estimate, observations)
+    assert found.brakes == ("j2",) and found.pushes == ("j1",)
+    said = told_scale(estimate, observations)
+    assert "on j1, and friction feeds energy in there" in said
+    assert "They have it on j2, though friction brakes there" in said
 
 
 def test_joints_that_differ_are_named(arm):

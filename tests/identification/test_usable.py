@@ -236,3 +236,13 @@ def test_a_remark_on_many_recordings_is_one_line_with_the_numbers_of_the_first(r
     both = said(5, other, other.replace("joint1", "joint2"))
     assert len(both) == 2 and "joint2.effort" in both[1]
     assert said(5, "no stamps in 7 rows") == ["run_1 and 4 more recordings: no stamps in 7 rows"]
+
+
+def test_many_recordings_without_rows_are_left_out_in_one_line(robot: Robot):
+    """Thirty-six of a hundred short logs had a paragraph each before the verdict."""
+    still = np.tile(np.array([[0.3], [-0.2]]), (1, 2400))
+    noise = 1e-5 * np.random.default_rng(0).standard_normal((5, *still.shape))
+    many = [replace(moving(robot, f"still_{k}", 5 + k), position=still + noise[k]) for k in range(5)]
+    found = identify(robot, [*many, moving(robot, "a_1", 1)], model="basic", bands=(4.0, 4.0))
+    (note,) = [note for note in found.notes if "independent rows are left" in note]
+    assert note.startswith("still_0 and 4 more recordings: 0 independent rows") and note.endswith("left out")
