@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from scara_ident.effects import swing as module
 from scara_ident.effects.swing import InitialState, Swing, free_swings, inverse, times
 from tests.arms import Array
 
@@ -182,3 +183,17 @@ def test_matrices_times_their_inverses_leave_vectors_as_they_are():
     rows = np.random.default_rng(1).standard_normal((4, 2, 50))
     matrices = two(80).inertia
     assert times(inverse(matrices), times(matrices, rows)) == pytest.approx(rows)
+
+
+@pytest.mark.parametrize("m", [1, 2, 3, 4])
+def test_inverses_are_those_of_a_general_solver(m: int):
+    rows = np.random.default_rng(m).standard_normal((m, m, 50)) + 3.0 * np.eye(m)[..., None]
+    expected = np.moveaxis(np.linalg.inv(np.moveaxis(rows, 2, 0)), 0, 2)
+    np.testing.assert_allclose(inverse(rows), expected, rtol=0, atol=1e-12 * np.abs(expected).max())
+
+
+def test_torques_that_are_solved_for_together_are_solved_for_as_if_alone():
+    load = np.random.default_rng(4).standard_normal((2 * module.ROWS_AT_ONCE + 1, 2, 500))
+    swing = two(500)
+    for part, each in zip(swing.solve(load), zip(*map(swing.solve, load), strict=True), strict=True):
+        np.testing.assert_array_equal(part, each)
