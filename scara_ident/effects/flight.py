@@ -106,10 +106,13 @@ class FreeLink:
             moved[-1, flown] = 0.5 * flight.side - place[flown]
         x, first, second = (self.width * part for part in self.lag)
         behind_it = joint_rows(term, behind(motion, j, (x, first, second)))
-        each = lagging_slopes(
-            self.signals, (j,), [link_slopes(self.signals, j)], behind_it, acting, [self._differentiated(moved)]
-        )
-        for joint, (places, rows) in enumerate(each):
+        about, lags = [link_slopes(self.signals, j)], [self._differentiated(moved)]
+        for joint in range(scene.robot.n):
+            own = np.flatnonzero(term.pattern[joint])
+            places = np.union1d(own, acting)
+            rows = np.zeros((len(places), motion.samples))
+            rows[np.searchsorted(places, acting)] = lagging_slopes(self.signals, joint, (j,), about, lags)
+            rows[np.searchsorted(places, own)] += behind_it[joint] - rigid_rows(self.signals)[joint]
             if joint == j:
                 rows[np.searchsorted(places, bodies)] += scale * turning * second
             yield places, rows

@@ -12,36 +12,25 @@ from functools import cached_property
 import numpy as np
 
 from scara_ident.arrays import Array
+from scara_ident.effects.matrices import inverse, times
 from scara_ident.motion.low_pass import low_pass
 
 # Radians of the free swing per sample up to which the scheme of fourth order is taken; it is stable up to 2.45.
 FINE_STEP = 2.0
+# Torques that are solved for together: what is made of more of them on the way leaves the processor's cache.
+ROWS_AT_ONCE = 4
 # A swing at the beginning that is seen with less than this share of the other ones' strength is not looked for.
 UNSEEN = 1e-3
 
 Lag = tuple[Array, Array, Array]
 
 
-def times(matrices: Array, rows: Array) -> Array:
-    """Return the products of matrices (m, m, N) with vectors (..., m, M) at the first M samples."""
-    count, m = rows.shape[-1], len(matrices)
-    result = np.empty(rows.shape)
-    for a in range(m):
-        result[..., a, :] = matrices[a, 0, :count] * rows[..., 0, :]
-        for b in range(1, m):
-            result[..., a, :] += matrices[a, b, :count] * rows[..., b, :]
-    return result
-
-
-def inverse(matrices: Array) -> Array:
-    """Return the inverses of matrices (m, m, N)."""
-    if len(matrices) == 1:
-        return np.asarray(1.0 / matrices)
-    if len(matrices) == 2:
-        # A twentieth of the time that a general solver takes for matrix after matrix.
-        (a, b), (c, d) = matrices
-        return np.asarray(np.array([[d, -b], [-c, a]]) / (a * d - b * c))
-    return np.ascontiguousarray(np.moveaxis(np.linalg.inv(np.moveaxis(matrices, 2, 0)), 0, 2))
+def _differences(x: Array, step: float, result: Array) -> None:
+    """Put the derivatives of signals (..., N) in their place: of second order, and of first at the ends."""
+    np.subtract(x[..., 2:], x[..., :-2], out=result[..., 1:-1])
+    result[..., 1:-1] /= 2.0 * step
+    for end, (one, other) in ((0, (1, 0)), (-1, (-1, -2))):
+        result[..., end] = (x[..., one] - x[..., other]) / step
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,17 +74,23 @@ class Swing:
         shape, (beta, mobility, bands) = np.shape(torque), self._system
         m, count = shape[-2:]
         rows = np.reshape(torque, (-1, m, count))
-        right = np.empty((len(rows), count, m))
         first_two = self.static(rows[..., :2]) if start is None else np.reshape(start, (-1, m, 2))
-        right[:, :2] = first_two.transpose(0, 2, 1)
-        mean = beta * (rows[..., 2:] + rows[..., :-2]) + (1.0 - 2.0 * beta) * rows[..., 1:-1]
-        right[:, 2:] = times(mobility, mean).transpose(0, 2, 1)
-        # Row after row: a solver that exchanges rows takes five times as long and loses digits to the length of the run.
-        flat = right.reshape(len(rows), -1).T
-        flat = np.asarray(dtbtrs(bands[:, : m * count], flat, uplo="L", diag="U", overwrite_b=True)[0]).T
-        x = np.ascontiguousarray(flat.reshape(-1, count, m).transpose(0, 2, 1))
-        first = np.gradient(x, self.step, axis=2)
-        second = times(self._free_mobility, rows - times(self.damping, first) - times(self.stiffness, x))
+        x, first, second = (np.empty(rows.shape) for _ in range(3))
+        for some in (slice(k, k + ROWS_AT_ONCE) for k in range(0, len(rows), ROWS_AT_ONCE)):
+            own, mean = rows[some], np.add(rows[some, :, 2:], rows[some, :, :-2])
+            mean *= beta
+            mean += (1.0 - 2.0 * beta) * own[..., 1:-1]
+            right = np.empty((len(own), count, m))
+            right[:, :2] = first_two[some].transpose(0, 2, 1)
+            right[:, 2:] = times(mobility, mean).transpose(0, 2, 1)
+            # Row after row: a solver that exchanges rows takes five times as long and loses digits to the length of the run.
+            flat = right.reshape(len(own), -1).T
+            flat = np.asarray(dtbtrs(bands[:, : m * count], flat, uplo="L", diag="U", overwrite_b=True)[0]).T
+            x[some] = flat.reshape(-1, count, m).transpose(0, 2, 1)
+            _differences(x[some], self.step, first[some])
+            left = own - times(self.damping, first[some])
+            left -= times(self.stiffness, x[some])
+            times(self._free_mobility, left, second[some])
         return x.reshape(shape), first.reshape(shape), second.reshape(shape)
 
     def static(self, torque: Array) -> Array:

@@ -33,14 +33,16 @@ from scara_ident.effects.links import (
     link_slopes,
     moved_inertia,
     on_links_at,
+    rigid_rows,
     rigid_torque,
     shared,
     usual_link_inertia,
     usual_link_inertia_slopes,
 )
+from scara_ident.effects.matrices import definite, times
 from scara_ident.effects.parameters import Member
 from scara_ident.effects.signals import Scene, Signals
-from scara_ident.effects.swing import InitialState, Lag, Swing, free_swings, times
+from scara_ident.effects.swing import InitialState, Lag, Swing, free_swings
 from scara_ident.model.terms import joint_rows
 from scara_ident.motion.motion import Motion
 
@@ -50,8 +52,6 @@ STEPS = 2
 SMALL_LAG = 5e-3
 # Gravity does not take away more than the rest of a gear's stiffness.
 LEAST_SPRING = 0.1
-# The links' mass matrix, scaled to a diagonal of 1, has no smaller eigenvalue, however poor the estimate.
-LEAST_EIGENVALUE = 0.01
 # Radians (of a joint that slides as much of its travel, see `Scene.radian`): a link that lags by more has no gear, whose springs
 # are wound by milliradians, by a few tenths in arms with springs on purpose. Newton's steps from there end nowhere.
 MOST_LAG = 1.0
@@ -130,7 +130,7 @@ class TwoMasses:
             # where a poor estimate has the inertia held there is none.
             by_v[a, a] = np.where(held > by_a[a, a] - self._armature[a], 0.0, by_v[a, a])
             by_a[a, a] = held
-        return by_q, by_v, _definite(by_a)
+        return by_q, by_v, definite(by_a)
 
     def _swing(self, slopes: Lag) -> Swing:
         spring, damping, inertia = (part.copy() for part in slopes)
@@ -293,36 +293,47 @@ class TwoMasses:
         right[-2, place] = -4.0 * np.pi * inertia * (turning[place] * x[place] + ratio[place] * first[place])
         right[-1, place] = -2.0 * turning[place] * inertia * first[place]
         lags = self._settled(swing, right)
-        begun = None
+        each = [(lags[0][:, a], lags[1][:, a], lags[2][:, a]) for a in range(len(own))]
+        about = [link_slopes(links, joint) for joint in own]
+        count, state = 0, np.zeros((0, 0))
         if self._initial is not None:
             # The swing at the beginning is fitted again whatever the parameters are.
-            count, free = self._initial.count, self._initial.free
+            count = self._initial.count
             whole = self._on_own((lags[0][..., :count], lags[1][..., :count], lags[2][..., :count]), links)
             whole += direct[..., :count]
             for a, at in enumerate(columns):
                 whole[np.searchsorted(acting, at), a] += bodies[own[a]][:, :count]
-            added = np.array([
-                sum(lagging(links, j, (free[0][k, a], free[1][k, a], free[2][k, a])) for a, j in enumerate(own))
-                for k in range(len(free[0]))
-            ])  # fmt: skip
-            begun = self._initial.state(whole, (x, first)), added
+            state = self._initial.state(whole, (x, first))
         shared_out = np.flatnonzero(share)
-        each = [(lags[0][:, a], lags[1][:, a], lags[2][:, a]) for a in range(len(own))]
-        slopes = [link_slopes(links, joint) for joint in own]
-        for joint, (found, rows) in enumerate(lagging_slopes(self.signals, own, slopes, bodies, acting, each)):
-            places = np.union1d(found, shared_out)
-            result = rows
-            if len(places) > len(found):
-                result = np.zeros((len(places), motion.samples))
-                result[np.searchsorted(places, found)] = rows
-            at = np.searchsorted(places, acting)
+        for joint in range(scene.robot.n):
+            body = np.flatnonzero(term.pattern[joint]) if carrier else shared_out[:0]
+            places = np.union1d(np.union1d(body, acting), shared_out)
+            result, at = np.zeros((len(places), motion.samples)), np.searchsorted(places, acting)
+            result[at] = lagging_slopes(self.signals, joint, own, about, each)
+            if carrier:
+                result[np.searchsorted(places, body)] += bodies[joint] - rigid_rows(self.signals)[joint]
             if joint in own:
                 result[at] += direct[:, own.index(joint)]
-            if begun is not None:
-                state, torque = begun
-                result[at, : torque.shape[-1]] -= state @ torque[:, joint]
+            if count:
+                result[at, :count] -= state @ self._begun[:, joint]
             result[np.searchsorted(places, shared_out)] += share[shared_out, None] * self.parts[place][joint]
             yield places, result
+
+    @property
+    def _begun(self) -> Array:
+        """What each unit of how links swung when the recording began changes of all torques, shape (2 m, n, M)."""
+        return self._kept("begun", self._made_begun)
+
+    def _made_begun(self) -> Array:
+        assert self._initial is not None
+        links, free = self._solved[2], self._initial.free
+        links = self.signals if links is None else links
+        each = [(free[0][:, a], free[1][:, a], free[2][:, a]) for a in range(len(self.joints))]
+        torques = [
+            sum(lagging_at(links, place, joint, own) for joint, own in zip(self.joints, each, strict=True))
+            for place in range(self.signals.scene.robot.n)
+        ]
+        return np.stack([np.asarray(torque) for torque in torques], axis=1)
 
     def _on_own(self, lag: Lag, links: Signals) -> Array:
         """Return what lags (..., m, N) change of their joints' torques, recorded side, (..., m, N), to first order about links."""
@@ -369,18 +380,3 @@ def usual_coupling(scene: Scene, joint: int, other: int) -> float:
 
 def _small(lag: Lag) -> bool:
     return bool(np.max(np.abs(lag[0])) < SMALL_LAG)
-
-
-def _definite(inertia: Array) -> Array:
-    """Return mass matrices (m, m, N) that are positive definite, their diagonals as they are."""
-    if len(inertia) == 1:
-        return inertia
-    size = np.sqrt(np.einsum("iin->in", inertia))
-    scaled = inertia / (size[:, None] * size)
-    # Of two the diagonal is 1 and what they share lies beside it.
-    least = 1.0 - np.abs(scaled[1, 0]) if len(size) == 2 else np.linalg.eigvalsh(np.moveaxis(scaled, 2, 0))[:, 0]
-    factor = np.where(least < LEAST_EIGENVALUE, (1.0 - LEAST_EIGENVALUE) / (1.0 - np.minimum(least, 0.5)), 1.0)
-    result = inertia * factor
-    for a in range(len(inertia)):
-        result[a, a] = inertia[a, a]
-    return np.asarray(result)

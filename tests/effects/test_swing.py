@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scara_ident.effects.swing import InitialState, Swing, free_swings, inverse, times
+from scara_ident.effects import swing as module
+from scara_ident.effects.matrices import times
+from scara_ident.effects.swing import InitialState, Swing, free_swings
 from tests.arms import Array
 
 STEP = 2e-3
@@ -178,7 +180,8 @@ def test_what_friction_hides_of_the_beginning_is_taken_for_no_swing():
     assert np.all(np.abs(hidden.state(left, size)) < 1e-3 * np.array([0.02, 0.02, 0.6, 0.6]))
 
 
-def test_matrices_times_their_inverses_leave_vectors_as_they_are():
-    rows = np.random.default_rng(1).standard_normal((4, 2, 50))
-    matrices = two(80).inertia
-    assert times(inverse(matrices), times(matrices, rows)) == pytest.approx(rows)
+def test_torques_that_are_solved_for_together_are_solved_for_as_if_alone():
+    load = np.random.default_rng(4).standard_normal((2 * module.ROWS_AT_ONCE + 1, 2, 500))
+    swing = two(500)
+    for part, each in zip(swing.solve(load), zip(*map(swing.solve, load), strict=True), strict=True):
+        np.testing.assert_array_equal(part, each)

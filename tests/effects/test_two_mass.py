@@ -310,3 +310,15 @@ def test_a_link_that_lags_by_more_than_gears_give_has_no_elastic_gear():
         assert not np.any(columns)
     stiff = TwoMasses(signals, (Member(1, (8.0, 0.1)), Member(5, (200.0, 0.2))))
     assert stiff.held and np.any(stiff.change)
+
+
+def test_what_a_swing_at_the_beginning_does_is_made_once_for_all_that_swing(monkeypatch):
+    scene, item, _ = periodic(load_robot("ur5"), {0: 3000.0, 1: 3000.0, 2: 3000.0})
+    members = members_with(scene, {0: 3000.0, 1: 3000.0, 2: 3000.0})
+    scene = replace(scene, together=tuple((JointElasticity(), member) for member in members))
+    signals, made, make = Signals(scene, item), [], TwoMasses._made_begun
+    assert item.torque is not None
+    monkeypatch.setattr(TwoMasses, "_made_begun", lambda self: made.append(self) or make(self))
+    for place in range(3):
+        assert len(list(TwoMasses(signals, members).slopes(place))) == 6
+    assert len(made) == 1
