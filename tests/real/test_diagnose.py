@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from types import ModuleType
 
+import numpy as np
 import pytest
 
 from scara_ident import load_robot, read_recordings
@@ -86,6 +87,7 @@ def test_what_is_found_on_half_of_the_ur10e_holds_on_recordings_that_nothing_saw
     """
     arm = shared_path("data", "ur10e")
     one, other = measured.halves(read_recordings([arm], load_robot(arm / "robot.yaml")))
+    one, other = ([item for item in half if np.ptp(item.time) < 45.0] for half in (one, other))
     found = measured.direction(arm, "basic", other, one)
     ratios = {(item["effect"], item["joint"]): item["ratio"] for item in found["effects"]}
     assert {(name, joint) for name, joint in ratios if name == "transmission_loss"} == {

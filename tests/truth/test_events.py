@@ -33,7 +33,7 @@ def with_pushes(recordings: list[Recording]) -> list[Recording]:
 
 def test_pushes_are_events_and_no_effect():
     """Commit a6cf3ca called it `complete` or `explained`, with 7 to 27 N m unexplained on the first joint."""
-    found = diagnose(ROBOT, with_pushes(runs(5)))
+    found = diagnose(ROBOT, with_pushes(runs(4)))
     assert found.effects == ()
     assert [event["recording"] for event in diagnosis_dict(found)["events"]] == ["run1", "run3"]
     for event, (_, start, stop, _) in zip(found.events, PUSHES, strict=True):
@@ -42,7 +42,7 @@ def test_pushes_are_events_and_no_effect():
         assert event.kind == "contact"
     # What is left is the noise: nothing of the pushes.
     left = [rows.rms(found.after.value) for rows in found.training_after.joints]
-    plain = identify(ROBOT, runs(5), bands=found.search.bands)
+    plain = identify(ROBOT, runs(4), bands=found.search.bands)
     assert left == pytest.approx([rows.rms(plain.estimate.value) for rows in plain.training.joints], rel=0.1)
 
 
