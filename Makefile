@@ -12,9 +12,9 @@ demo: $(STAMP)
 # While working: three minutes. Before a change lands: everything.
 check: lint types fast
 
-# Types are checked beside the tests: alone they would leave a core idle for most of a minute.
+# Types are checked beside the rest: alone they would leave a core idle for most of a minute.
 test: $(STAMP)
-	$(MAKE) --no-print-directory -j 2 lint compiled
+	$(MAKE) --no-print-directory lint
 	$(MAKE) --no-print-directory -j 2 types unit
 
 lint: $(STAMP)
@@ -35,7 +35,7 @@ PYTEST := PYTHONDONTWRITEBYTECODE= OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BI
 fast: $(STAMP)
 	$(PYTEST) --dist worksteal -m "not slow"
 
-unit: $(STAMP)
+unit: $(STAMP) compiled
 	$(PYTEST) --dist worksteal
 
 # Speed, beside figaroh in an environment of its own; writes docs/benchmarks.md.
