@@ -100,7 +100,7 @@ class OnlineIdentifier:
         Raises
         ------
         UsageError
-            If the shapes are not these, or velocity or acceleration are given with a band.
+            If the shapes are not these, or velocity or acceleration are given with a band or are missing without one.
         """
         row = self._buffer[self._filled]
         for place, (name, signal) in enumerate(self._given(q, v, a, effort)):
@@ -119,7 +119,7 @@ class OnlineIdentifier:
         Raises
         ------
         UsageError
-            If the shapes are not these, or velocity or acceleration are given with a band.
+            If the shapes are not these, or velocity or acceleration are given with a band or are missing without one.
         """
         given = [signal for _, signal in self._given(q, v, a, effort)]
         shapes = {np.shape(signal) for signal in given}
@@ -277,7 +277,11 @@ class OnlineIdentifier:
     ) -> list[tuple[str, ArrayLike]]:
         """Return the signals that are taken in, with their names."""
         if self._filter is None:
-            return [("position", q), ("velocity", v), ("acceleration", a), ("effort", effort)]  # type: ignore[list-item]
+            if v is None or a is None:
+                raise UsageError(
+                    "online: velocity or acceleration is None, and there is no band in which positions tell them; give both, or a band"
+                )
+            return [("position", q), ("velocity", v), ("acceleration", a), ("effort", effort)]
         for name, signal in (("velocity", v), ("acceleration", a)):
             if signal is not None:
                 raise UsageError(f"online: {name} is given beside a band, in which positions tell it; give None")
