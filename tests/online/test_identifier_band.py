@@ -179,7 +179,7 @@ def test_velocity_beside_a_band_and_none_without_are_refused():
         for v, a in ((None, None), (one, None), (None, one)):
             with pytest.raises(UsageError, match=r"velocity or acceleration is None, .* give both, or a band"):
                 take(one, v, a, one)
-    assert plain.samples == 0
+    assert online.samples == plain.samples == 0
 
 
 def test_a_block_that_cannot_be_absorbed_does_not_end_it(monkeypatch: pytest.MonkeyPatch):
