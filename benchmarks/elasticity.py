@@ -25,8 +25,9 @@ from scara_ident.diagnosis.cluster_test import needed
 from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.diagnose import Diagnosis, diagnose
 from scara_ident.diagnosis.evidence import least_found
-from scara_ident.diagnosis.linearised import STEPLESS, linearise
+from scara_ident.diagnosis.linearised import linearise
 from scara_ident.diagnosis.selection_step import best_of_each
+from scara_ident.diagnosis.trust_region import least_squares
 from scara_ident.effects import EffectTerm, Member, Scene
 from scara_ident.effects.catalogue import effects_named
 from scara_ident.effects.links import usual_link_inertia
@@ -114,11 +115,7 @@ def expected_ratio(found: Diagnosis, runs: Sequence[SimulationResult]) -> tuple[
         for item in (step.columns, CandidateColumns(held_out))
     )
     rows = np.vstack([fitted.information.factor, fitted.prior.factor])[:, :-1]
-    size = np.linalg.norm(rows, axis=0)
-    size[size == 0.0] = 1.0
-    _, singular, right = np.linalg.svd(rows / size, full_matrices=False)
-    kept = singular > STEPLESS * singular[0]
-    root = (right[kept].T / singular[kept]) / size[:, None]
+    root = least_squares(rows, np.zeros(len(rows)))[1]
     # Of weighted rows the noise is the same on every joint, and divides out.
     more = [
         weight**2

@@ -17,6 +17,7 @@ from scara_ident.arrays import Array
 from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, Rows, with_columns
 from scara_ident.diagnosis.fitted_model import FittedModel
 from scara_ident.diagnosis.selection_step import SelectionStep
+from scara_ident.diagnosis.trust_region import least_squares, length, within_radius
 from scara_ident.diagnosis.unknowns import Unknown, unknowns_of
 from scara_ident.effects import Scene, Tie
 from scara_ident.estimation.information import Information, merge, weighted
@@ -24,8 +25,6 @@ from scara_ident.estimation.joint_rows import JointRows
 from scara_ident.estimation.run_variation import RunVariation
 from scara_ident.threads import one_blas_thread, side_by_side
 
-# Directions whose singular value, columns scaled to unit length, is below this share of the largest take no step.
-STEPLESS = 1e-9
 # A row that ties a coefficient is so many times as weighty as all rows that it acts on.
 TIGHTNESS = 1e3
 
@@ -126,39 +125,51 @@ class Linearised:
         """Return the share of the squared residual that parameters as `solve` returns them promise to remove."""
         return 1.0 - self.information.residual_sum(way) / (self.variance * self.rows)
 
-    def solve(self, damping: float = 0.0) -> tuple[Array, Array]:
+    def solve(self) -> tuple[Array, Array]:
         """Return the best parameters, nonlinear ones as a change, and the white standard deviations of all.
 
-        Those that would leave their bounds stay there, and all others are the best beside them.
+        Those at a bound that would leave it stay there, and all others are the best beside them.
+        """
+        _, root, by, columns, target = self._apart
+        changes, own, _ = least_squares(columns, target)
+        stuck = np.array(
+            [item.moved(x) == item.value for item, x in zip(self.unknowns, changes, strict=True)], dtype=bool
+        )
+        if np.any(stuck):
+            changes, own, _ = least_squares(np.where(stuck, 0.0, columns), target)
+        linear = np.sum(root**2, axis=1) + np.sum((by @ own) ** 2, axis=1)
+        return self._way(changes), np.sqrt(self.variance * np.append(linear, np.sum(own**2, axis=1)))
+
+    def step(self, radius: float = np.inf) -> Array:
+        """Return the best parameters that one step may reach, nonlinear ones as a change.
 
         Parameters
         ----------
-        damping : float, optional
-            By which the change of each nonlinear parameter is held back, as a share of how strongly rows tell it beside the linear
-            ones (Marquardt 1963).
+        radius : float, optional
+            How long it may be, see `length`.
         """
-        best, std = self._solve(damping, np.zeros(0, dtype=np.intp))
-        changes = best[self.linear :]
-        stuck = [item.moved(change) == item.value for item, change in zip(self.unknowns, changes, strict=True)]
-        return self._solve(damping, self.linear + np.flatnonzero(stuck)) if any(stuck) else (best, std)
+        *_, columns, target = self._apart
+        return self._way(within_radius(columns, target, [item.room for item in self.unknowns], radius))
 
-    def _solve(self, damping: float, held: NDArray[np.intp]) -> tuple[Array, Array]:
+    def length(self, way: Array) -> float:
+        """Return how long a way is: of changes of nonlinear parameters, each times what rows tell of it beside the linear ones."""
+        return length(self._apart[3], way[self.linear :])
+
+    @cached_property
+    def _apart(self) -> tuple[Array, Array, Array, Array, Array]:
+        """Linear parameters at no change of the nonlinear ones, the root of their covariance, what they lose by each of these, (k, s).
+
+        Last come the columns of the nonlinear ones and the target beside what linear ones reach.
+        """
         rows = np.vstack([self.information.factor, self.prior.factor])
-        if damping:
-            triangular = np.asarray(np.linalg.qr(rows[:, :-1], mode="r"))
-            beside = triangular[self.linear :, self.linear :]
-            further = np.zeros((len(self.unknowns), rows.shape[1]))
-            further[:, self.linear : -1] = np.diag(np.sqrt(damping) * np.linalg.norm(beside, axis=0))
-            rows = np.vstack([rows, further])
-        columns, target = rows[:, :-1].copy(), rows[:, -1]
-        columns[:, held] = 0.0
-        size = np.linalg.norm(columns, axis=0)
-        size[size == 0.0] = 1.0
-        left, singular, right = np.linalg.svd(columns / size, full_matrices=False)
-        kept = singular > STEPLESS * singular[0]
-        half = right[kept].T / singular[kept]
-        best = half @ (left[:, kept].T @ target) / size
-        return best, np.sqrt(self.variance * np.sum(half**2, axis=1)) / size
+        theirs, target = rows[:, self.linear : -1], rows[:, -1]
+        value, root, basis = least_squares(rows[:, : self.linear], target)
+        by = root @ (basis.T @ theirs)
+        return value, root, by, theirs - basis @ (basis.T @ theirs), target - basis @ (basis.T @ target)
+
+    def _way(self, changes: Array) -> Array:
+        value, _, by, _, _ = self._apart
+        return np.concatenate([value - by @ changes, changes])
 
 
 def linearise(step: SelectionStep) -> Linearised:

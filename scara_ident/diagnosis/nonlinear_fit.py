@@ -1,7 +1,8 @@
-"""Fitting the nonlinear parameters of all effects in a model together, by steps that are held back where they led too far.
+"""Fitting the nonlinear parameters of all effects in a model together, by steps that are as long as their linear model has held.
 
-The method is that of Levenberg (Quarterly of Applied Mathematics 2, 1944) and Marquardt (J. SIAM 11, 1963); what linear parameters
-take up is no part of what holds a step back (Golub and Pereyra, SIAM J. Numerical Analysis 10, 1973).
+The method is that of Levenberg (Quarterly of Applied Mathematics 2, 1944) and Marquardt (J. SIAM 11, 1963) with the radius of Moré
+(Lecture Notes in Mathematics 630, 1978); what linear parameters take up is no part of a step's length (Golub and Pereyra, SIAM J.
+Numerical Analysis 10, 1973).
 """
 
 from __future__ import annotations
@@ -27,8 +28,12 @@ NOTHING = 0.04
 RISE = 1e-5
 # A step that lowers the squared error by a smaller share is the last of a coarse fit.
 LEAST_FALL = 0.03
-# No step is tried that is held back more: it would be a hundredth as long as one that nothing holds.
-MOST_DAMPING = 100.0
+# Of what the linear model promises: a step that kept more may be longer next, and one that kept less was too long.
+MOST_KEPT, LEAST_KEPT = 0.75, 0.25
+# A step that is turned back is tried again with no smaller share of its length.
+SHORTEST = 0.1
+# No step is tried that is a smaller share of one that nothing holds back.
+LEAST_RADIUS = 0.01
 
 
 def tune(step: SelectionStep, *, coarse: bool = False) -> SelectionStep:
@@ -50,37 +55,35 @@ def tune(step: SelectionStep, *, coarse: bool = False) -> SelectionStep:
     step = replace(step, scene=without_others(step.scene, step.chosen))
     settling = _settling(step)
     best: Linearised | None = None
-    share, damping, turned_back = 1.0, 0.0, False
+    way, radius, cut = np.zeros(0), np.inf, False
     tied = any(item.effect.tie(step.scene, item.member) is not None for item in step.chosen)
     for _ in range(TIED_ROUNDS if tied else ROUNDS):
         now = linearise(step)
-        before, turned_back = turned_back, best is not None and now.error > (1.0 + RISE) * best.error
-        if best is not None and turned_back:
-            # A step as long as half of the last, where that is not cut short.
-            damping = 2.0 * damping + 1.0
-            if damping > MOST_DAMPING:
+        if best is not None:
+            radius = _radius(radius, best.length(way), _kept(best, now, way))
+        if best is not None and now.error > (1.0 + RISE) * best.error:
+            if radius < LEAST_RADIUS * best.length(best.step()):
                 break
-            way = best.solve(damping)[0]
         else:
-            way, std = now.solve()
             # Where the way is longer than a step may be, how little one gains says nothing of the whole, of which the model does.
-            near = coarse and (share == 1.0 or now.gain(way) < LEAST_FALL)
+            whole, std = now.step(), now.solve()[1]
+            near = coarse and (not cut or now.gain(whole) < LEAST_FALL)
             arrived = near and best is not None and best.error - now.error < LEAST_FALL * best.error
             best = now
-            if _is_short(now, way, std, settling):
-                if _share(now, way) < 1.0:
+            if _is_short(now, whole, std, settling):
+                if _is_cut(now, whole):
                     break
                 # So short a step needs no look at where it leads.
-                step = _moved(step, now, way, 1.0)
-                return replace(step, scene=at_estimate(step.scene, step.chosen, way[: now.linear]))
+                step = _moved(step, now, whole)
+                return replace(step, scene=at_estimate(step.scene, step.chosen, whole[: now.linear]))
             if arrived:
                 break
-            # A longer one after two that went well: after one alone every other step would be turned back.
-            damping = damping if before else 0.5 * max(damping - 1.0, 0.0)
-            if damping:
-                way = now.solve(damping)[0]
-        share = _share(best, way)
-        step = _moved(step, best, way, share)
+        way = best.step(radius)
+        if radius < np.inf and _is_short(best, way, std, settling):
+            # Where the error does not do what the model promises, shorter steps tell nothing.
+            break
+        cut = _is_cut(best, way)
+        step = _moved(step, best, way)
     assert best is not None
     step = replace(step, scene=at_estimate(best.scene, best.chosen, best.value), chosen=best.chosen)
     return step if coarse else _settled(step)
@@ -120,9 +123,25 @@ def _is_short(state: Linearised, way: Array, std: Array, settling: NDArray[np.in
     return bool(np.all(steps <= SETTLED * std[state.linear :])) or state.gain(way) * state.rows <= NOTHING
 
 
-def _share(state: Linearised, way: Array) -> float:
-    """Return how much of a way may be gone at once."""
-    return min([1.0, *(item.share(x) for item, x in zip(state.unknowns, way[state.linear :], strict=True))])
+def _is_cut(state: Linearised, way: Array) -> bool:
+    """Whether a way ends where the linear model holds no further, and not at a bound."""
+    return any(abs(x) >= item.reach for item, x in zip(state.unknowns, way[state.linear :], strict=True))
+
+
+def _kept(before: Linearised, after: Linearised, way: Array) -> float:
+    """Return the share of what the linear model promised that a way kept; negative where the error rose."""
+    promised = max(before.gain(way), np.finfo(float).tiny)
+    return (before.error - after.error) / (promised * before.error)
+
+
+def _radius(radius: float, length: float, kept: float) -> float:
+    """Return how long the next step may be after one of a length that kept such a share of its promise."""
+    if kept < 0.0:
+        # Where the parabola through both errors, with the promised slope, has its least.
+        return length * max(SHORTEST, 0.5 / (1.0 - kept))
+    if kept < LEAST_KEPT:
+        return 0.5 * length
+    return max(radius, 2.0 * length) if kept > MOST_KEPT else radius
 
 
 def _settling(step: SelectionStep) -> NDArray[np.intp]:
@@ -137,16 +156,15 @@ def _settling(step: SelectionStep) -> NDArray[np.intp]:
     return np.concatenate(places)
 
 
-def _moved(step: SelectionStep, state: Linearised, way: Array, share: float) -> SelectionStep:
-    """Return a step after a share of a way from its linear model, the nonlinear parameters within their bounds."""
+def _moved(step: SelectionStep, state: Linearised, way: Array) -> SelectionStep:
+    """Return a step after a way from its linear model."""
     chosen = list(state.chosen)
     armatures = dict(state.scene.armatures)
     for item, change in zip(state.unknowns, way[state.linear :], strict=True):
-        value = item.moved(share * change)
+        value = item.moved(change)
         if item.owner is None:
             armatures[item.place] = float(np.exp(value))
         else:
             chosen[item.owner] = moved_candidate(chosen[item.owner], item.place, value)
-    old = estimate_of(state.scene, state.chosen)
-    scene = at_estimate(state.scene, chosen, old + share * (way[: len(old)] - old))
+    scene = at_estimate(state.scene, chosen, way[: state.linear])
     return replace(step, scene=replace(scene, armatures=armatures), chosen=tuple(chosen))

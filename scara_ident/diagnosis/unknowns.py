@@ -57,11 +57,15 @@ class Unknown:
             return ARMATURE_STEP
         return DERIVATIVE_STEP * (abs(self.value) if self.value else self.upper - self.lower)
 
-    def share(self, change: float) -> float:
-        """Return the share of a step that it may go at once, beyond which the linear model does not hold."""
-        reach = LONGEST_STEP if self.owner is None else LONGEST_STEP * abs(self.value) if self.value else np.inf
-        # A bound that is within reach stops it, and not all others with it.
-        return 1.0 if abs(self.moved(change) - self.value) <= reach else reach / abs(change)
+    @property
+    def reach(self) -> float:
+        """How far it may go at once: beyond that the linear model does not hold."""
+        return LONGEST_STEP if self.owner is None else LONGEST_STEP * abs(self.value) if self.value else np.inf
+
+    @property
+    def room(self) -> tuple[float, float]:
+        """The least and the largest change that one step may have, by its bounds and how far the linear model holds."""
+        return max(self.lower - self.value, -self.reach), min(self.upper - self.value, self.reach)
 
     def moved(self, change: float) -> float:
         """Return its value after a step, within its bounds."""

@@ -11,6 +11,7 @@ import pytest
 from scara_ident.diagnosis.candidates import Candidate, with_columns
 from scara_ident.diagnosis.linearised import with_estimate_slopes
 from scara_ident.diagnosis.selection_step import SelectionStep
+from scara_ident.diagnosis.trust_region import NEAR
 from scara_ident.effects import Member
 from scara_ident.effects.friction import Stribeck
 from scara_ident.effects.gear import TransmissionLoss
@@ -158,26 +159,51 @@ def test_beside_a_parameter_at_its_bound_all_others_are_the_best_without_it() ->
     assert np.delete(change, place) == pytest.approx(best, rel=1e-6)
 
 
-@pytest.mark.parametrize("damping", [0.5, 7.0])
-def test_a_step_that_is_held_back_is_the_best_of_that_penalty_and_linear_parameters_are_free(damping: float) -> None:
+def test_a_step_within_a_radius_is_the_best_of_its_length_and_linear_parameters_are_free() -> None:
     chosen = (Candidate(Stribeck(), Member(1, (0.2,))), Candidate(TransmissionLoss(), Member(0, (0.3,))))
     state = linear(step_beside(loss_runs(0.3, 1.0)[:1], chosen, WEIGHTS))
     rows = np.vstack([state.information.factor, state.prior.factor])
     own, theirs = rows[:, : state.linear], rows[:, state.linear : -1]
     beside = theirs - own @ np.linalg.lstsq(own, theirs, rcond=1e-9)[0]
     left = rows[:, -1] - own @ np.linalg.lstsq(own, rows[:, -1], rcond=1e-9)[0]
-    normal = beside.T @ beside
-    best = np.linalg.solve(normal + damping * np.diag(np.diag(normal)), beside.T @ left)
-    found, _ = state.solve(damping)
-    assert found[state.linear :] == pytest.approx(best, rel=1e-5)
-    given = np.linalg.lstsq(own, rows[:, -1] - theirs @ best, rcond=1e-9)[0]
-    assert own @ found[: state.linear] == pytest.approx(own @ given, abs=1e-7 * np.max(np.abs(rows[:, -1])))
     way = state.solve()[0]
     whole = way[state.linear :]
+    size = np.linalg.norm(beside, axis=0)
+    assert state.length(way) == pytest.approx(np.linalg.norm(size * whole), rel=1e-6)
+    # No room ends so near.
+    radius = 0.05 * state.length(way)
+    found = state.step(radius)
+    assert state.length(found) == pytest.approx(radius, rel=NEAR)
+    # With a multiplier it leaves least.
+    change = found[state.linear :]
+    slope = beside.T @ (left - beside @ change)
+    multiplier = (slope / size) @ (size * change) / np.sum((size * change) ** 2)
+    assert multiplier > 0.0
+    best = np.linalg.solve(beside.T @ beside + multiplier * np.diag(size**2), beside.T @ left)
+    assert size * change == pytest.approx(size * best, abs=1e-4 * radius)
+    given = np.linalg.lstsq(own, rows[:, -1] - theirs @ change, rcond=1e-9)[0]
+    assert own @ found[: state.linear] == pytest.approx(own @ given, abs=1e-7 * np.max(np.abs(rows[:, -1])))
     # By dense rows.
-    size = np.repeat(WEIGHTS, [rows.table.shape[1] for rows in state.joints])
+    weights = np.repeat(WEIGHTS, [rows.table.shape[1] for rows in state.joints])
     columns = dense(state.joints, len(way))
-    after = size * (np.concatenate([rows.table[-1] for rows in state.joints]) - columns @ way)
+    after = weights * (np.concatenate([rows.table[-1] for rows in state.joints]) - columns @ way)
     assert state.gain(way) == pytest.approx(1.0 - np.mean(after**2) / state.variance, abs=1e-9)
-    assert state.gain(way) > 0.0
-    assert np.linalg.norm(beside @ best) < np.linalg.norm(beside @ whole)
+    assert state.gain(way) > state.gain(found) > 0.0
+
+
+def test_a_step_ends_where_its_room_does_and_the_others_make_the_best_of_that() -> None:
+    """The whole way was cut in proportion: what one parameter could not go, none of the others went."""
+    chosen = (Candidate(Stribeck(), Member(1, (0.05,))), Candidate(TransmissionLoss(), Member(0, (0.2,))))
+    state = linear(step_beside(loss_runs(0.3, 1.0)[:1], chosen, WEIGHTS))
+    free, _ = state.solve()
+    place = state.linear
+    low, high = state.unknowns[0].room
+    narrow = replace(state.unknowns[0], lower=state.unknowns[0].value - 1e-4, upper=state.unknowns[0].value + 1e-4)
+    assert max(low, -1e-4) > free[place] or free[place] > min(high, 1e-4)
+    found = replace(state, unknowns=(narrow, *state.unknowns[1:])).step()
+    assert abs(found[place]) == pytest.approx(1e-4)
+    rows = np.vstack([state.information.factor, state.prior.factor])
+    others = np.delete(rows, place, axis=1)
+    scale = np.linalg.norm(others[:, :-1], axis=0)
+    best = np.linalg.lstsq(others[:, :-1] / scale, rows[:, -1] - rows[:, place] * found[place], rcond=1e-9)[0] / scale
+    assert np.delete(found, place) == pytest.approx(best, rel=1e-5)

@@ -351,8 +351,14 @@ def test_a_coarse_fit_goes_on_where_a_step_was_cut_short_that_the_model_promises
             self.promised = next(promised)
             seen.append(self)
 
-        def solve(self, damping: float = 0.0):
+        def solve(self):
             return np.zeros(1), np.zeros(1)
+
+        def step(self, radius: float = np.inf):
+            return np.zeros(1)
+
+        def length(self, way) -> float:
+            return 1.0
 
         def gain(self, way) -> float:
             return self.promised
@@ -362,7 +368,7 @@ def test_a_coarse_fit_goes_on_where_a_step_was_cut_short_that_the_model_promises
     monkeypatch.setattr(module, "linearise", lambda step: State())
     monkeypatch.setattr(module, "_is_short", lambda *_: False)
     monkeypatch.setattr(module, "_settling", lambda step: np.zeros(0, dtype=np.intp))
-    monkeypatch.setattr(module, "_share", lambda *_: 0.5)
+    monkeypatch.setattr(module, "_is_cut", lambda *_: True)
     monkeypatch.setattr(module, "_moved", lambda step, *_: step)
     monkeypatch.setattr(module, "at_estimate", lambda *_: step.scene)
     tune(step, coarse=True)

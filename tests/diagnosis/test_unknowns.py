@@ -30,19 +30,13 @@ def test_a_rotor_that_nobody_stated_has_a_wide_prior_within_what_the_estimate_le
     assert guessed.spread == np.log(GUESS_FACTOR)
     assert guessed.nominal == np.log(robot.rotor_guess.armature[0])
     assert guessed.upper <= np.log(largest_armature(scene, 0))
-    assert guessed.share(-2.0 * LONGEST_STEP) == 0.5
+    assert guessed.room[0] == -LONGEST_STEP
     assert guessed.moved(100.0) == guessed.upper
 
 
-def test_a_bound_stops_a_parameter_and_not_all_others_with_it() -> None:
-    """A share of 0.005, its least, that wanted to fall by 0.106 cut the steps of all others to a fiftieth."""
-    inside, held = (Unknown(0, 0, value, 0.005, 0.9) for value in (0.006, 0.005))
-    assert inside.share(-0.106) == 1.0
-    assert held.share(-0.106) == 1.0
-    assert held.share(0.1) == pytest.approx(LONGEST_STEP * 0.005 / 0.1)
-
-
-def test_a_bound_out_of_reach_is_not_reached_at_once() -> None:
+def test_a_step_goes_no_further_than_a_bound_and_than_the_linear_model_holds() -> None:
     """A frequency of 24 Hz that wanted to fall by 42 went to its least, 2 Hz: only what it could fall was cut, and not its step."""
-    free = Unknown(0, 0, 24.0, 2.0, 200.0)
-    assert free.moved(free.share(-42.0) * -42.0) == pytest.approx(24.0 - LONGEST_STEP * 24.0)
+    assert Unknown(0, 0, 24.0, 2.0, 200.0).room == (-LONGEST_STEP * 24.0, LONGEST_STEP * 24.0)
+    assert Unknown(0, 0, 0.006, 0.005, 0.9).room == pytest.approx((-0.001, LONGEST_STEP * 0.006))
+    # What is zero has no size that a share could be of.
+    assert Unknown(0, 0, 0.0, -0.1, 0.1).room == (-0.1, 0.1)
