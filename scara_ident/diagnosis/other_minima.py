@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from scara_ident.diagnosis.candidates import Candidate, columns_at_hand
+from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, columns_at_hand
 from scara_ident.diagnosis.effect_parameters import physical_parameters
 from scara_ident.diagnosis.linearised import linearise
 from scara_ident.diagnosis.nonlinear_fit import LEAST_FALL, RISE, tune
@@ -21,7 +21,7 @@ from scara_ident.diagnosis.same_errors import same
 from scara_ident.diagnosis.selection_step import SelectionStep
 from scara_ident.effects import Parameter
 from scara_ident.errors import RecordingError
-from scara_ident.estimation.noise_bias import noisy
+from scara_ident.estimation.noise_bias import OF_LAG, noisy
 from scara_ident.estimation.run_offsets import offsets_on
 
 # A fit that leaves so many times as much is no rival, whatever rows will weigh in the end.
@@ -152,18 +152,33 @@ def _alike(step: SelectionStep, other: SelectionStep, places: Sequence[int]) -> 
 
 def _below(step: SelectionStep) -> SelectionStep | None:
     """Return the fit in the lower part of the band; None where recordings are too short for that or positions have no noise."""
-    if not noisy(step.observations.data):
+    data = step.observations.data
+    if not noisy(data, OF_LAG):
         return None
-    # Half-way to it, by octaves, as of a fast resonance little is in so low a part.
+    # Half-way to it, by octaves, as of a fast resonance little is in so low a part; further where a resonance still makes more of
+    # the noise than of the motion: with a damping that is too large for the gear it is fitted to both, and as much noise once
+    # more then says nothing of that.
     share = float(np.sqrt(step.criteria.lower_band))
-    bands = tuple(share * (band or step.scene.band) for band in step.observations.data.bands)
-    try:
-        columns = step.columns.at(bands)
-    except RecordingError:
+    lower = [tuple(share * (band or step.scene.band) for band in data.bands)]
+    while noisy(data.at(lower[-1]), OF_LAG):
+        lower.append(tuple(share * band for band in lower[-1]))
+    columns = next(
+        (found for found in (_columns_at(step, bands) for bands in reversed(lower)) if found is not None), None
+    )
+    if columns is None:
         return None
-    scene = replace(step.scene, band=max(bands), columns=columns_at_hand(columns.observations))
+    band = max(band or step.scene.band for band in columns.observations.data.bands)
+    scene = replace(step.scene, band=band, columns=columns_at_hand(columns.observations))
     variation = offsets_on(columns.observations, step.offsets)
     return tune(replace(step, scene=scene, columns=columns, variation=variation))
+
+
+def _columns_at(step: SelectionStep, bands: tuple[float, ...]) -> CandidateColumns | None:
+    """Return the columns in some bands; None where a recording is too short for them."""
+    try:
+        return step.columns.at(bands)
+    except RecordingError:
+        return None
 
 
 def _others(step: SelectionStep, other: SelectionStep, places: Sequence[int]) -> bool:

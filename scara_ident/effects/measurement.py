@@ -34,9 +34,10 @@ LARGEST_MISMATCH = 2.0
 MOST_TO_DOUBT = 2
 # Torque that is held from one sample to the next, or averaged over one, is up to this many samples off its time stamp.
 SAMPLING = 1.0
-# Of positions that are late by T seconds, motion faster than this over T, Hz, is half gone where a filter makes them late: a mean
-# over 2 T or a lag of first order leaves 76 or 62 % of it, and the phases that its derivatives give hold up to there.
-FILTERED = 0.2
+# Of positions that are late by T seconds, motion up to this over T, Hz, is known where a filter makes them late: a mean over 2 T or a lag
+# of first order leaves 86 or 73 % of it, and the derivatives of `PositionFilter` all of the torque but 0.2 or 2 %. Of a fifth over T they leave 1
+# and 10 %, for which gears of single joints may stand.
+FILTERED = 0.15
 # Data are corrected until a further delay is below this, s.
 DELAY_STEP = 2e-5
 

@@ -139,5 +139,5 @@ def _away_from_turns(part: PreparedStretch, band: float | None) -> NDArray[np.bo
     """Tell where a low-pass sees nothing of a joint's rest or of its turning round, shape (n, N): friction jumps there."""
     memory = 0 if band is None else int(np.ceil(MEMORY * part.rate / band))
     turns = np.diff(np.sign(part.motion.v), axis=1, append=0.0) != 0.0
-    seen = np.cumsum(np.pad((part.fade < WHOLE) | turns, [(0, 0), (memory + 1, memory)]), axis=1)
+    seen = np.cumsum(np.pad((part.moving < WHOLE) | turns, [(0, 0), (memory + 1, memory)]), axis=1)
     return np.asarray(seen[:, 2 * memory + 1 :] == seen[:, : part.samples])

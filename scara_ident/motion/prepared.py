@@ -1,7 +1,7 @@
 """Recordings made ready for one choice of bands: everything that does not depend on a model, each part made once.
 
-Both sides of a joint's torque equation are faded out towards rest, where friction is unknown, and then low-passed at the
-joint's band. Of the low-passed samples only as many are kept as the band leaves independent; they stand in blocks of
+Both sides of a joint's torque equation are faded out towards rest, where friction is unknown, and towards the ends, where the
+acceleration is, and then low-passed at the joint's band. Of the low-passed samples only as many are kept as the band leaves independent; they stand in blocks of
 time, long against the filter's memory.
 """
 
@@ -21,7 +21,7 @@ from scara_ident.manners import Frozen
 from scara_ident.motion.low_pass import HIGHEST_CUT, ROWS_AT_ONCE, low_pass, low_pass_every
 from scara_ident.motion.motion import Motion, Stretch, motion_of, stretches, torque_of, with_effort_of
 from scara_ident.motion.periods import Periods, periods_of
-from scara_ident.motion.rest import FEW_SAMPLES, Bands, fading, position_cuts, standstill
+from scara_ident.motion.rest import FEW_SAMPLES, Bands, at_ends, fading, position_cuts, standstill
 from scara_ident.motion.trajectories import Trajectories, trajectories_of
 from scara_ident.recording.recording import Recording
 from scara_ident.threads import made_once, side_by_side
@@ -146,7 +146,12 @@ class PreparedStretch:
 
     @made_once
     def fade(self) -> Array:
-        """Weight of both sides of the equation, shape (n, N): 0 at rest, 1 away from it, see `fading`."""
+        """Weight of both sides of the equation, shape (n, N): `moving`, less towards the ends, see `at_ends`."""
+        return self.moving * at_ends(self.samples, self.trim)
+
+    @property
+    def moving(self) -> Array:
+        """Weight of every sample, shape (n, N): 0 at rest, 1 away from it, see `fading`."""
         return self._moving if self.left_out is False else fading(self.rest, self.rate, self.bands)
 
     @property

@@ -161,6 +161,27 @@ def fading(rest: NDArray[np.bool_], rate: float, bands: Bands) -> Array:
     return result
 
 
+def at_ends(samples: int, trim: int) -> Array:
+    """Return the weight of every sample of a stretch, shape (N,), that rises over the first samples and falls over the last.
+
+    What is before the first position is a guess, and with it the acceleration of a joint that moves there: unfaded, the
+    low-pass carries 3 % of it to the first samples that are used, with this weight 1e-4 at the most.
+
+    Parameters
+    ----------
+    samples : int
+        N.
+    trim : int
+        Samples at either end of which none is used.
+    """
+    # Above zero throughout: no sample counts as at rest by it.
+    rise = np.sin(0.5 * np.pi * np.arange(1, min(trim, samples) + 1) / (trim + 1)) ** 2
+    result = np.ones(samples)
+    result[: len(rise)] *= rise
+    result[samples - len(rise) :] *= rise[::-1]
+    return result
+
+
 def _widening(periods: float, rate: float, band: float | None, longest: float = LONGEST_WIDENING) -> int:
     return 1 if band is None else max(1, int(rate * min(periods / (POSITION_BAND * band), longest)))
 

@@ -15,7 +15,7 @@ from scara_ident.diagnosis.effect_parameters import physical_parameters
 from scara_ident.diagnosis.linearised import linearise
 from scara_ident.diagnosis.nonlinear_fit import tune
 from scara_ident.diagnosis.other_laws import parameters_of_laws
-from scara_ident.diagnosis.other_minima import as_good, lowest, widened
+from scara_ident.diagnosis.other_minima import _below, as_good, lowest, widened
 from scara_ident.diagnosis.selection_step import SelectionStep
 from scara_ident.effects import Member, Parameter
 from scara_ident.effects.elasticity import JointElasticity
@@ -123,6 +123,29 @@ def test_what_differs_in_the_lower_part_of_the_band_is_in_the_standard_deviation
         told = parameters_of_laws(step).effects[1]["stiffness"]
         assert told.value == own.value
         assert (told.std > 900.0) == far and (told.std == own.std) != far
+
+
+def test_the_lower_part_of_the_band_ends_where_what_lags_has_no_noise(monkeypatch: pytest.MonkeyPatch):
+    """In 23 Hz three gears of 12, 15 and 6 kN m/rad were 10.5 +- 0.4, 14.2 +- 0.2 and 6.7 +- 0.2: of accelerations little was noise."""
+    step = step_beside(
+        exact_runs(1, 1), [Candidate(FAMILY, Member(j, (9.0 - j, 0.1))) for j in (0, 1)], bands=(20.0, 20.0)
+    )
+    module = sys.modules[lowest.__module__]
+    monkeypatch.setattr(module, "tune", lambda step: step)
+    share = step.criteria.lower_band**0.5
+    for quiet, steps in ((15.0, 1), (11.0, 2), (5.0, 3)):
+        monkeypatch.setattr(
+            module, "noisy", lambda data, derivatives=0, quiet=quiet: derivatives > 0 and max(data.bands) >= quiet
+        )
+        found = _below(step)
+        assert found is not None
+        assert found.observations.data.bands == pytest.approx([20.0 * share**steps] * 2)
+        assert found.scene.band == pytest.approx(20.0 * share**steps)
+    # Recordings too short for a band are looked at in the next wider one.
+    monkeypatch.setattr(module, "noisy", lambda data, derivatives=0: max(data.bands) >= 0.1)
+    assert 0.1 < _below(step).observations.data.bands[0] < 5.0
+    monkeypatch.setattr(module, "noisy", lambda data, derivatives=0: False)
+    assert _below(step) is None
 
 
 @pytest.mark.slow

@@ -252,7 +252,9 @@ def test_only_positions_that_are_late_by_more_than_a_sample_may_be_filtered():
     assert delay.leaves(scene, Member(None), np.array([0.02])) is None
     assert delay.leaves(scene, Member(None), np.array([-0.0015])) is None
     found = delay.leaves(scene, Member(None), np.array([-0.02]))
-    assert found == (PositionFilter(), Member(None), pytest.approx(10.0))
+    assert found == (PositionFilter(), Member(None), pytest.approx(7.5))
     assert PositionFilter().members(scene) == (Member(None),)
-    # A mean of twice its delay keeps three quarters there.
-    assert np.sinc(0.04 * found[2]) == pytest.approx(0.76, abs=0.01)
+    # A mean of twice its delay keeps most there, and its inverse is what the derivatives say to two thousandths.
+    assert np.sinc(0.04 * found[2]) == pytest.approx(0.86, abs=0.01)
+    turned = np.pi * 0.04 * found[2]
+    assert turned / np.sin(turned) == pytest.approx(1.0 + turned**2 / 6.0 + 7.0 * turned**4 / 360.0, abs=2e-3)

@@ -62,5 +62,5 @@ def test_the_times_at_rest_of_a_motion_that_is_not_recorded_yet_are_foreseen(mod
     bands, fade = reach.foreseen(part.torque, part.motion.v, RATE)
     assert bands == (6.0, 6.0)
     # Short of a thirtieth of the time, and a fifth of that at most is not foreseen.
-    assert np.all(np.mean(part.fade < 0.5, axis=1) > 0.025)
-    assert np.all(np.mean((fade < 0.5) != (part.fade < 0.5), axis=1) < 0.005)
+    assert np.all(np.mean(part.moving < 0.5, axis=1) > 0.025)
+    assert np.all(np.mean((fade < 0.5) != (part.moving < 0.5), axis=1) < 0.005)
