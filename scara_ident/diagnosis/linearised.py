@@ -94,11 +94,15 @@ class Linearised:
     @property
     def error(self) -> float:
         """Squared residual with what the priors add to it, the bodies as they were where effects follow from them."""
-        prior = sum(((item.value - item.nominal) / item.spread) ** 2 for item in self.unknowns)
         left = self.variance * self.rows
         if len(self.ties.factor):
             left = self.information.residual_sum(_solved(self.information, self._held, self._fitted))
-        return left + self.variance * prior
+        return left + self._prior_sum(np.zeros(len(self.unknowns)))
+
+    def _prior_sum(self, changes: Array) -> float:
+        """Return what the priors add to the squared residual after changes of the nonlinear parameters."""
+        pairs = zip(self.unknowns, changes, strict=True)
+        return float(self.variance * sum(((item.value + x - item.nominal) / item.spread) ** 2 for item, x in pairs))
 
     @property
     def _held(self) -> Information:
@@ -122,8 +126,9 @@ class Linearised:
         return merge([Information(rows, 0.0), self.ties])
 
     def gain(self, way: Array) -> float:
-        """Return the share of the squared residual that parameters as `solve` returns them promise to remove."""
-        return 1.0 - self.information.residual_sum(way) / (self.variance * self.rows)
+        """Return the share of the squared residual, with what the priors add, that parameters as `solve` returns them promise to remove."""
+        left = self.information.residual_sum(way) + self._prior_sum(way[self.linear :])
+        return 1.0 - left / (self.variance * self.rows + self._prior_sum(np.zeros(len(self.unknowns))))
 
     def solve(self) -> tuple[Array, Array]:
         """Return the best parameters, nonlinear ones as a change, and the white standard deviations of all.

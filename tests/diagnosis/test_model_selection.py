@@ -13,16 +13,14 @@ from scara_ident.diagnosis import model_selection
 from scara_ident.diagnosis.candidates import CandidateColumns
 from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.model_selection import _asked_band, _band_beyond, _promised_band, select_model
-from scara_ident.diagnosis.outcome import Outcome
+from scara_ident.diagnosis.outcome import Outcome, outcome_of
 from scara_ident.diagnosis.search import SearchTask, search
-from scara_ident.diagnosis.selection_step import observed_at_every_sample
 from scara_ident.effects import CATALOGUE
 from scara_ident.effects.elasticity import JointElasticity
 from scara_ident.effects.links import usual_link_inertia
 from scara_ident.effects.periodic import Vibration
 from scara_ident.effects.position import Spring
 from scara_ident.effects.presliding import Presliding
-from scara_ident.estimation import wls
 from scara_ident.estimation.bands import choose_bands
 from scara_ident.estimation.observations import observe
 from scara_ident.estimation.run_offsets import rms_of
@@ -110,15 +108,15 @@ def test_an_effect_that_stands_for_one_outside_the_catalogue_is_not_counted() ->
     (refused,) = outcome.demoted
     assert (refused.label, refused.accepted, refused.tentative) == (proxy, False, True)
     assert refused.why.startswith("it would remove ")
-    before, after = rms_of(first.start.value, first.uncorrected, first.start.offsets)[1], first.steps[-1].rms[1]
+    beside = outcome_of(SearchTask(MODEL, CATALOGUE), first)
+    before = rms_of(first.start.value, first.uncorrected, first.start.offsets)[1]
+    after = rms_of(beside.after.value, beside.training, beside.after.offsets)[1]
     assert before is not None
     assert after is not None
-    noise = outcome.fit_after[1].noise
-    seen = observed_at_every_sample(first.step)
-    estimate = wls(seen)
-    assert estimate.variation is not None
-    variation = estimate.variation if estimate.offsets is None else estimate.variation.without_offsets
-    share = (before**2 - after**2) / (before**2 - variation.mean_squares(seen.joints)[1] - noise**2)
+    noise, variation = beside.fit_after[1].noise, beside.after.variation
+    assert variation is not None
+    variation = variation if beside.after.offsets is None else variation.without_offsets
+    share = (before**2 - after**2) / (before**2 - variation.mean_squares(beside.training.joints)[1] - noise**2)
     assert share < CRITERIA.least_of_repeatable
     assert abs(float(refused.why.split("remove ")[1].split("%")[0]) - 100.0 * share) < 2.0
 
