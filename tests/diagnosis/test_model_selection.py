@@ -15,6 +15,7 @@ from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.model_selection import _asked_band, _band_beyond, _promised_band, select_model
 from scara_ident.diagnosis.outcome import Outcome, outcome_of
 from scara_ident.diagnosis.search import SearchTask, search
+from scara_ident.diagnosis.selection_step import observed
 from scara_ident.effects import CATALOGUE
 from scara_ident.effects.elasticity import JointElasticity
 from scara_ident.effects.links import usual_link_inertia
@@ -22,6 +23,7 @@ from scara_ident.effects.periodic import Vibration
 from scara_ident.effects.position import Spring
 from scara_ident.effects.presliding import Presliding
 from scara_ident.estimation.bands import choose_bands
+from scara_ident.estimation.least_squares import value_and_weights
 from scara_ident.estimation.observations import observe
 from scara_ident.estimation.run_offsets import rms_of
 from scara_ident.motion.prepared import prepare
@@ -109,13 +111,14 @@ def test_an_effect_that_stands_for_one_outside_the_catalogue_is_not_counted() ->
     assert (refused.label, refused.accepted, refused.tentative) == (proxy, False, True)
     assert refused.why.startswith("it would remove ")
     beside = outcome_of(SearchTask(MODEL, CATALOGUE), first)
-    before = rms_of(first.start.value, first.uncorrected, first.start.offsets)[1]
-    after = rms_of(beside.after.value, beside.training, beside.after.offsets)[1]
+    offsets, without = beside.after.offsets, observed(first.step.without(0))
+    before = rms_of(value_and_weights(without, offsets)[0], without, offsets)[1]
+    after = rms_of(beside.after.value, beside.training, offsets)[1]
     assert before is not None
     assert after is not None
     noise, variation = beside.fit_after[1].noise, beside.after.variation
     assert variation is not None
-    variation = variation if beside.after.offsets is None else variation.without_offsets
+    variation = variation if offsets is None else variation.without_offsets
     share = (before**2 - after**2) / (before**2 - variation.mean_squares(beside.training.joints)[1] - noise**2)
     assert share < CRITERIA.least_of_repeatable
     assert abs(float(refused.why.split("remove ")[1].split("%")[0]) - 100.0 * share) < 2.0
