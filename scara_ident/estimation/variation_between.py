@@ -28,6 +28,7 @@ from scara_ident.estimation.run_variation import (
 )
 from scara_ident.estimation.shared_delays import SharedDelays, shared_delays
 from scara_ident.estimation.variance_components import components, expected
+from scara_ident.motion.low_pass import noise_share
 from scara_ident.recording.pieces import of_one_run
 from scara_ident.threads import side_by_side
 
@@ -99,7 +100,8 @@ def variation_between(
         directions = directions_of(observations, joint, rows, value)
         item = None if known is None else known.joints[joint]
         left = rows.left(value) - (0.0 if item is None else item.off)
-        return _sums(directions, left, rows.starts, firsts)
+        found = _sums(directions, left, rows.starts, firsts)
+        return None if found is None else replace(found, passed=_passed(observations, joint))
 
     sums = side_by_side(of_joint, range(len(joints)), joints)
     lost = np.ones(len(joints)) if taken is None else taken
@@ -140,7 +142,6 @@ def _shared(
             priors[place, :kinds] = (item.std / np.where(own.back[:kinds] > 0.0, own.back[:kinds], np.inf)) ** 2
         priors[place, kinds:] = np.where(own.back[kinds:] > 0.0, np.inf, 0.0)
     rms = np.array([np.sqrt(np.mean(own.directions**2, axis=1)) for own, _ in told])
-    # How sure each is their disagreement says, and not the memory of the noise.
     return shared_delays(
         np.array([own.products for own, _ in told]),
         np.array([own.aims for own, _ in told]),
@@ -163,9 +164,11 @@ class _Sums:
     aims : ndarray, shape (runs, kinds)
     back : ndarray, shape (kinds,)
         The unit of each direction; 0 where a kind does nothing.
-    memory : ndarray, shape (kinds,)
-        How many times the variance of what a run tells of each is that of white noise, see `JointVariation.memory`.
+    memory : float
+        See `JointVariation.memory`.
     bounds : ndarray of int, shape (runs + 1,)
+    passed : float
+        How many rows stand for an independent one where the noise is white before the low-pass: a sum of them is so much less sure.
     """
 
     directions: Array
@@ -173,16 +176,17 @@ class _Sums:
     aims: Array
     back: Array
     noise: float
-    memory: Array
+    memory: float
     bounds: NDArray[np.intp]
+    passed: float = 1.0
 
-    @property
-    def remembered(self) -> tuple[Array, Array]:
-        """Products and aims as sure as the memory of the noise leaves them: what a run tells is the same."""
-        scale = 1.0 / np.sqrt(self.memory)
-        products = self.products * np.outer(scale, scale)
-        off = np.linalg.pinv(self.products, rcond=RANK, hermitian=True) @ self.aims[:, :, None]
-        return products, (products @ off)[:, :, 0]
+
+def _passed(observations: Observations, joint: int) -> float:
+    """Return the density of low-passed white noise below the band over that of as strong noise which its rows do not remember."""
+    parts = [part for part in observations.data.stretches if part.usable]
+    rows = np.array([len(part.kept[joint]) for part in parts], dtype=float)
+    over = [1.0 / (part.steps[joint] * noise_share(part.rate, part.bands[joint])) for part in parts]
+    return max(1.0, float(rows @ over / np.sum(rows))) if np.any(rows) else 1.0
 
 
 def _sums(directions: Array, left: Array, starts: NDArray[np.intp], firsts: NDArray[np.intp]) -> _Sums | None:
@@ -195,18 +199,19 @@ def _sums(directions: Array, left: Array, starts: NDArray[np.intp], firsts: NDAr
     found, by_residual, noise, spread = _of_runs(directions[shown] / size[shown, None], left, starts, firsts)
     if noise == 0.0:
         return None
+    # The memory of the noise makes directions less sure than white noise would.
+    scale = 1.0 / np.sqrt(spread)
     products, aims, back = np.zeros((runs, kinds, kinds)), np.zeros((runs, kinds)), np.zeros(kinds)
-    products[:, np.outer(shown, shown)] = found.reshape(runs, -1)
-    aims[:, shown] = by_residual / noise
-    back[shown] = noise / size[shown]
-    whole = np.ones(kinds)
-    whole[shown] = spread
-    return _Sums(directions, products, aims, back, noise, whole, bounds)
+    products[:, np.outer(shown, shown)] = (found * np.outer(scale, scale)).reshape(runs, -1)
+    aims[:, shown] = by_residual * scale / noise
+    back[shown] = scale * noise / size[shown]
+    memory = float(spread[np.count_nonzero(shown[:OFFSET])]) if shown[OFFSET] else 1.0
+    return _Sums(directions, products, aims, back, noise, memory, bounds)
 
 
 def _estimated(joints: Sequence[_Sums], taken: Sequence[float]) -> list[JointVariation | None]:
     """Return how runs differ on each of some joints, of which parameters take up so many offsets."""
-    products, aims = (np.array(each) for each in zip(*(item.remembered for item in joints), strict=True))
+    products, aims = np.array([item.products for item in joints]), np.array([item.aims for item in joints])
     runs = aims.shape[1]
     told = np.array([item.back > 0.0 for item in joints])
     if runs < LEAST_RUNS:
@@ -214,7 +219,10 @@ def _estimated(joints: Sequence[_Sums], taken: Sequence[float]) -> list[JointVar
     # Parameters are fitted to all runs, so that these lie about their own mean.
     draws = np.full(told.shape, runs - 1.0)
     draws[:, OFFSET] = np.clip(runs - np.array(taken), 1.0, runs - 1.0)
-    variances = components(products, aims, told, draws)
+    # What chance explains is asked with as many rows as are independent; what it does not is as large as runs lie apart.
+    passed = np.array([item.passed for item in joints])[:, None, None]
+    differ = components(products / passed[..., None], aims / passed, told, draws) > 0.0
+    variances = components(products, aims, differ, draws)
     means, unsure = expected(products, aims, variances)
     return [
         JointVariation(
@@ -224,19 +232,13 @@ def _estimated(joints: Sequence[_Sums], taken: Sequence[float]) -> list[JointVar
             item.noise,
             item.bounds,
             spread * item.back**2,
-            float(item.memory[OFFSET]),
+            item.memory,
             draws=float(own[OFFSET]),
         )
         if np.any(variance)
         else None
         for item, variance, mean, spread, own in zip(joints, variances, means, unsure, draws, strict=True)
     ]
-
-
-def _basis(rows: Array) -> Array:
-    """Return orthonormal rows that reach as far as some rows, shape (r, N)."""
-    _, singular, right = np.linalg.svd(rows, full_matrices=False)
-    return np.asarray(right[singular > np.sqrt(RANK) * np.max(singular, initial=0.0)])
 
 
 def _of_runs(
@@ -252,8 +254,7 @@ def _of_runs(
         product, aim = own @ own.T, own @ rest
         products.append(product)
         aims.append(aim)
-        basis = _basis(own)
-        rest = rest - basis.T @ (basis @ rest)
+        rest = rest - np.linalg.lstsq(product, aim, rcond=RANK)[0] @ own
         squares += float(rest @ rest)
         rows += max(0.0, stop - start - len(unit))
         blocks = starts[firsts[run] : firsts[run + 1] + 1]
@@ -261,9 +262,7 @@ def _of_runs(
         begins = blocks[:-1][np.diff(blocks) > 0] - start
         if len(begins):
             scatter += np.sum(np.add.reduceat(own * rest, begins, axis=1) ** 2, axis=1)
-            # Of what is left after these fits white noise makes less than of itself.
-            taken = np.add.reduceat(own[:, None] * basis, begins, axis=2)
-            white += np.diag(product) - np.sum(taken**2, axis=(1, 2))
+        white += np.diag(product)
     variance = squares / rows if rows else 0.0
     spread = np.maximum(1.0, scatter / np.maximum(variance * white, np.finfo(float).tiny))
     return np.array(products), np.array(aims), float(np.sqrt(variance)), spread
