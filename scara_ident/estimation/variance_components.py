@@ -2,8 +2,8 @@
 
 Each run lies off the mean along some directions, of which its rows tell with a known precision. What is left of a fit shows
 fewer draws of them than there are runs: parameters take up the others (Patterson and Thompson 1971). The variances are found
-by expectation and maximisation (Searle, Casella and McCulloch 1992, "Variance Components", section 8.3), and kinds that
-chance explains are left out one by one.
+by expectation and maximisation (Searle, Casella and McCulloch 1992, "Variance Components", section 8.3). Kinds that chance
+explains are left out one by one.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ CHANCE = 5.41
 STEPS = 40
 
 
-def components(products: Array, aims: Array, kept: NDArray[np.bool_], draws: Array) -> Array:
-    """Return the variance of each kind on each joint, shape (joints, kinds); 0 where chance explains it.
+def differing(products: Array, aims: Array, kept: NDArray[np.bool_], draws: Array) -> NDArray[np.bool_]:
+    """Return which kinds differ on each joint by more than chance explains, shape (joints, kinds).
 
     Kinds are left out one by one.
 
@@ -37,7 +37,7 @@ def components(products: Array, aims: Array, kept: NDArray[np.bool_], draws: Arr
     # Every set of kinds that may be left, in the same steps: bit k of its place says whether kind k is in it.
     sets = (np.arange(2**kinds)[:, None] >> np.arange(kinds)) & 1 == 1
     variances, likelihoods = _most_likely(products, aims, kept[:, None] & sets, draws)
-    found = np.zeros(kept.shape)
+    found = np.zeros(kept.shape, dtype=bool)
     for joint, own in enumerate(kept):
         place = int(np.sum(1 << np.flatnonzero(own)))
         while place:
@@ -46,8 +46,19 @@ def components(products: Array, aims: Array, kept: NDArray[np.bool_], draws: Arr
             if not 2.0 * (likelihoods[joint, place] - likelihoods[joint, likeliest]) <= CHANCE:
                 break
             place = likeliest
-        found[joint] = variances[joint, place]
+        found[joint] = variances[joint, place] > 0.0
     return found
+
+
+def components(products: Array, aims: Array, kept: NDArray[np.bool_], draws: Array) -> Array:
+    """Return the variance of each kind on each joint, shape (joints, kinds); 0 for kinds that are not kept.
+
+    Parameters
+    ----------
+    products, aims, kept, draws
+        See `differing`.
+    """
+    return _most_likely(products, aims, kept[:, None], draws)[0][:, 0] if np.any(kept) else np.zeros(kept.shape)
 
 
 def expected(products: Array, aims: Array, variance: Array) -> tuple[Array, Array]:

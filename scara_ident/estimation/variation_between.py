@@ -27,7 +27,7 @@ from scara_ident.estimation.run_variation import (
     directions_of,
 )
 from scara_ident.estimation.shared_delays import SharedDelays, shared_delays
-from scara_ident.estimation.variance_components import components, expected
+from scara_ident.estimation.variance_components import components, differing, expected
 from scara_ident.motion.low_pass import noise_share
 from scara_ident.recording.pieces import of_one_run
 from scara_ident.threads import side_by_side
@@ -221,7 +221,7 @@ def _estimated(joints: Sequence[_Sums], taken: Sequence[float]) -> list[JointVar
     draws[:, OFFSET] = np.clip(runs - np.array(taken), 1.0, runs - 1.0)
     # What chance explains is asked with as many rows as are independent; what it does not is as large as runs lie apart.
     passed = np.array([item.passed for item in joints])[:, None, None]
-    differ = components(products / passed[..., None], aims / passed, told, draws) > 0.0
+    differ = differing(products / passed[..., None], aims / passed, told, draws)
     variances = components(products, aims, differ, draws)
     means, unsure = expected(products, aims, variances)
     return [

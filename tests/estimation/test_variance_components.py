@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from scara_ident.estimation.variance_components import components, expected
+from scara_ident.estimation.variance_components import components, differing, expected
 
 
 def runs_of(seed: int, variance: np.ndarray, count: int = 12) -> tuple[np.ndarray, np.ndarray]:
@@ -43,9 +43,14 @@ def test_several_joints_are_as_each_alone_and_what_is_not_there_is_left_out():
     kept = np.ones(truth.shape, dtype=bool)
     kept[3, 1] = False
     draws = np.full(truth.shape, 12.0)
-    found = components(products, aims, kept, draws)
+    differ = differing(products, aims, kept, draws)
+    found = components(products, aims, differ, draws)
     for joint in range(len(truth)):
-        alone = components(products[joint, None], aims[joint, None], kept[joint, None], draws[joint, None])
+        own = slice(joint, joint + 1)
+        assert_array_equal(differ[joint], differing(products[own], aims[own], kept[own], draws[own])[0])
+        alone = components(products[own], aims[own], differ[own], draws[own])
         assert_allclose(found[joint], alone[0], rtol=1e-12)
-    assert_array_equal(found[:3] > 0.0, truth[:3] > 0.0)
-    assert found[3, 1] == 0.0
+    assert_array_equal(differ[:3], truth[:3] > 0.0)
+    assert not differ[3, 1]
+    assert_array_equal(found > 0.0, differ)
+    assert not np.any(components(products, aims, np.zeros(kept.shape, dtype=bool), draws))

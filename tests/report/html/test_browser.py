@@ -9,7 +9,8 @@ from tests.report.html.test_page import PAGES
 
 pytestmark = pytest.mark.slow
 
-EMPTY = """() => [...document.querySelectorAll("[data-figure], [data-arm]")].filter((figure) => {
+# Figures without anything drawn, on a page or in an element of it.
+EMPTY = """(part) => [...(part || document).querySelectorAll("[data-figure], [data-arm]")].filter((figure) => {
   if (figure.hidden) return false;
   const svg = figure.querySelector("svg");
   if (figure.dataset.drawn !== "true" || !svg || /NaN|Infinity|undefined/.test(svg.outerHTML.replace(/href="[^"]*"/g, ""))) return true;
@@ -53,10 +54,11 @@ def test_every_figure_is_drawn_whatever_is_chosen(pages, opened, kind):
     # Half of the kinds on a wide light page, half on a narrow dark one.
     if kind in PAGES[::2]:
         assert barriers(page, kind) == []
-    for select in page.query_selector_all("select[data-place]"):
-        for place in range(select.evaluate("select => select.options.length")):
-            select.select_option(index=place)
-            assert page.evaluate(EMPTY) == []
+    for group in page.query_selector_all("[data-group]"):
+        for select in group.query_selector_all("select[data-place]"):
+            for place in range(select.evaluate("select => select.options.length")):
+                select.select_option(index=place)
+                assert page.evaluate(EMPTY, group) == []
 
 
 def _view(page, figure: str) -> tuple[float, float]:
