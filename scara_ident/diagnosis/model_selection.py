@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +15,7 @@ from scara_ident.diagnosis.criteria import SelectionCriteria
 from scara_ident.diagnosis.noise_check import noise_objection
 from scara_ident.diagnosis.outcome import Outcome, outcome_of
 from scara_ident.diagnosis.proxies import proxies
-from scara_ident.diagnosis.search import Search, SearchTask, scene_of, search, search_again
+from scara_ident.diagnosis.search import Search, SearchTask, in_place_of, scene_of, search, search_again
 from scara_ident.diagnosis.selection_step import SelectionStep
 from scara_ident.diagnosis.work import first, next_of
 from scara_ident.estimation import wls
@@ -156,21 +156,33 @@ def _widest(data: PreparedData) -> float:
 def _without_proxies(task: SearchTask, found: Outcome) -> Outcome:
     """Search again without effects that stand for another, or for none."""
     demoted: dict[str, Decision] = {}
+    instead: dict[str, tuple[Candidate, Candidate]] = {}
     left = task.progress
     for _ in range(task.criteria.most_demotions):
-        refused = [*proxies(found, task.criteria), *_unstable(found, tuple(demoted.values()))]
+        refused = [*proxies(found, task.criteria), *_unstable(found, _others(demoted, found))]
         if not refused:
             break
         demoted |= {item.label: item for item in reversed(refused)}
+        scene = found.search.scene
+        instead = {label: pair for label, pair in instead.items() if all(item.label != label for item in refused)}
+        instead |= {pair[0].label(scene): pair for pair in in_place_of(task.catalogue, refused, scene)}
+        without = [label for label in demoted if label not in instead]
         now, left = next_of(left)
-        found = outcome_of(task, search_again(replace(task, progress=now), found.search, demoted))
+        again = search_again(replace(task, progress=now), found.search, without, tuple(instead.values()))
+        found = outcome_of(task, again)
     else:
         # No further search, but nothing is believed that does not stand.
-        while unstable := _unstable(found, tuple(demoted.values())):
+        while unstable := _unstable(found, _others(demoted, found)):
             demoted |= {item.label: item for item in unstable}
             found = outcome_of(task, found.search.without([item.label for item in unstable]))
     short = [item.refused(TOO_LITTLE.format(item)) for item in found.hinted]
-    return replace(found, demoted=tuple(demoted.values()), suspected=tuple(short))
+    return replace(found, demoted=_others(demoted, found), suspected=tuple(short))
+
+
+def _others(demoted: Mapping[str, Decision], found: Outcome) -> tuple[Decision, ...]:
+    """Return those in whose place nothing of their name was found."""
+    chosen = _labels(found.search)
+    return tuple(item for item in demoted.values() if item.label not in chosen)
 
 
 def _unstable(found: Outcome, demoted: Sequence[Decision]) -> list[Decision]:

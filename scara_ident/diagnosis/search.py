@@ -177,7 +177,9 @@ def search(task: SearchTask, columns: CandidateColumns, *, known: Search | None 
     return _searched(task, _Base(start, observations, scene), state, known, frozenset(), ())
 
 
-def search_again(task: SearchTask, found: Search, without: Collection[str]) -> Search:
+def search_again(
+    task: SearchTask, found: Search, without: Collection[str], instead: Sequence[tuple[Candidate, Candidate]] = ()
+) -> Search:
     """Find what the model lacks without some effects, from where the first of them came in.
 
     Parameters
@@ -186,10 +188,13 @@ def search_again(task: SearchTask, found: Search, without: Collection[str]) -> S
         That found them.
     without : collection of str
         Labels of what is not to be tried.
+    instead : sequence of (Candidate, Candidate), optional
+        What is not to be tried, and in its place, see `in_place_of`.
     """
-    place = next((k for k, (label, _) in enumerate(found.passed) if label in without), 0)
+    gone = {*without, *(old.label(found.scene) for old, _ in instead if old in found.chosen)}
+    place = next((k for k, (label, _) in enumerate(found.passed) if label in gone), 0)
     state = found.passed[place][1]
-    state = state.with_more([item for item in _beginnings(found) if item not in state.pool])
+    state = state.with_more([item for item in _beginnings(found) if item not in state.pool]).exchanged(instead)
     base = _Base(found.start, found.uncorrected, found.first)
     return _searched(task, base, state.only({*without, *state.labels}), found, frozenset(without), found.passed[:place])
 
@@ -226,6 +231,8 @@ def _searched(
         seeds = line_candidates(scene, residuals, task.catalogue, criteria)
         taken = {*without, *state.labels}
         decisions += step.judge([item for item in seeds if item.label(scene) not in taken])
+        beyond = [item for item in decisions if item.as_no_arm > 0.0 and item.label not in taken]
+        decisions += step.judge([item for _, item in in_place_of(task.catalogue, beyond, scene)])
         winner, refused = None, dict[str, Decision]()
         if len(state.steps) < most:
             winner, refused, scene = choose(step, decisions, near)
@@ -271,6 +278,18 @@ def _searched(
         doubtful,
         passed,
     )
+
+
+def in_place_of(
+    catalogue: Sequence[Effect], refused: Sequence[Decision], scene: Scene
+) -> list[tuple[Candidate, Candidate]]:
+    """Return effects that are not believed, each with one that is tried in its place, see `Effect.in_place_of`."""
+    found = []
+    for item in refused:
+        old, value = item.candidate, item.examination.value
+        members = ((effect, effect.in_place_of(scene, old.effect, old.member, value)) for effect in catalogue)
+        found += [(old, Candidate(effect, member)) for effect, member in members if member is not None]
+    return found
 
 
 def _in_intervals(catalogue: Sequence[Effect], state: SearchState) -> list[Candidate]:

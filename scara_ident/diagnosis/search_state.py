@@ -105,6 +105,15 @@ class SearchState:
         step = replace(self.step, tried=self.step.tried + len(more))
         return replace(self, step=step, pool=(*self.pool, *more), candidates=(*self.candidates, *more))
 
+    def exchanged(self, pairs: Sequence[tuple[Candidate, Candidate]]) -> SearchState:
+        """Return the state with some candidates in the place of others."""
+        if not pairs:
+            return self
+        old = [item for item, _ in pairs]
+        pool, candidates = (tuple(item for item in items if item not in old) for items in (self.pool, self.candidates))
+        more = [item for _, item in pairs if item not in pool]
+        return replace(self, pool=pool, candidates=candidates).with_more(more)
+
     def only(self, without: Collection[str]) -> SearchState:
         """Return the state with no candidates of some labels."""
         kept = tuple(item for item in self.candidates if item.label(self.step.scene) not in without)

@@ -60,7 +60,12 @@ class Unknown:
     @property
     def reach(self) -> float:
         """How far it may go at once: beyond that the linear model does not hold."""
-        return LONGEST_STEP if self.owner is None else LONGEST_STEP * abs(self.value) if self.value else np.inf
+        if self.owner is None:
+            return LONGEST_STEP
+        if self.lower < 0.0 < self.upper:
+            # What may have either sign is no larger for being far from zero.
+            return LONGEST_STEP * (self.upper - self.lower)
+        return LONGEST_STEP * abs(self.value) if self.value else np.inf
 
     @property
     def room(self) -> tuple[float, float]:

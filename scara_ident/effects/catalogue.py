@@ -5,6 +5,7 @@ from __future__ import annotations
 from itertools import chain, groupby
 from typing import Any
 
+from scara_ident.effects.compact_payload import CompactPayload
 from scara_ident.effects.coupling import DriveCoupling, InertiaCoupling
 from scara_ident.effects.drift import OffsetDrift, WarmUp
 from scara_ident.effects.effect import Effect
@@ -48,6 +49,7 @@ CATALOGUE: tuple[Effect, ...] = (
     FreePayloadChange(),
     PayloadInIntervals(),
     PayloadOfRecordings(),
+    CompactPayload(),
     GravityCounterbalance(),
     TorqueSensorNonlinearity(),
     BentTorqueSensor(),

@@ -18,7 +18,17 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.effects.following import EstimateSlopes, slopes_by_differences
-from scara_ident.effects.parameters import OWN, Coefficient, Member, NonlinearParameter, Parameter, Tie, View, deviation
+from scara_ident.effects.parameters import (
+    OWN,
+    Coefficient,
+    Member,
+    NonlinearParameter,
+    Parameter,
+    SpectralLine,
+    Tie,
+    View,
+    deviation,
+)
 from scara_ident.effects.signals import Scene, Signals
 from scara_ident.errors import ScaraIdentError
 from scara_ident.model.terms import Column
@@ -29,14 +39,6 @@ from scara_ident.recording.recording import Recording
 DOUBT_STDS = 2.0
 # Values of a nonlinear parameter that are tried where a family does not say which.
 SCAN_POINTS = 5
-
-
-@dataclass(frozen=True)
-class SpectralLine:
-    """A line of a joint's residual: so many periods per motor turn (``order``), or Hz (``frequency``)."""
-
-    kind: Literal["order", "frequency"]
-    position: float
 
 
 @dataclass(frozen=True)
@@ -248,10 +250,7 @@ class Effect(ABC):
         }
 
     def told(self, parameters: Mapping[str, Parameter]) -> Mapping[str, Parameter]:
-        """Return the physical parameters, nonlinear ones among them, each with the power of it that the data tell.
-
-        For a family in which that follows from how sure others are; else `parameters` and `NonlinearParameter` say it.
-        """
+        """Return physical parameters, nonlinear ones too, with the power of each that the data tell, where others decide that."""
         return parameters
 
     def told_beside(self, scene: Scene, member: Member) -> Member | None:
@@ -287,6 +286,10 @@ class Effect(ABC):
 
     def in_full(self) -> Effect | None:
         """Return a family with more columns that may take its place once a member is to be believed; None without one."""
+        return None
+
+    def in_place_of(self, scene: Scene, effect: Effect, member: Member, value: Array) -> Member | None:
+        """Return what to try in the place of one of another family whose coefficients are those of no arm; None without one."""
         return None
 
     def other_laws(self) -> tuple[Effect, ...]:
@@ -329,12 +332,9 @@ class Effect(ABC):
         return None
 
     def slopes(self, signals: Signals, member: Member) -> Iterable[tuple[NDArray[np.intp], Array]]:
-        """Give of each joint the derivatives of a tied member's torque, its coefficient held, by what `Tie.slopes` names.
+        """Give of each joint by which of the ``p + 1 + s`` of `Tie.slopes` a tied member's torque changes, and its derivatives (k, N).
 
-        Yields
-        ------
-        tuple of (ndarray of int, shape (k,), ndarray, shape (k, N))
-            Places among the ``p + 1 + s`` of `Tie.slopes`, and the derivatives by these; all others are zero.
+        Its coefficient is held; places (k,) that are not given have derivatives of zero.
         """
         raise NotImplementedError(f"{self.name} is tied and has no slopes")
 

@@ -99,6 +99,14 @@ class Coefficient:
 
 
 @dataclass(frozen=True)
+class SpectralLine:
+    """A line of a joint's residual: so many periods per motor turn (``order``), or Hz (``frequency``)."""
+
+    kind: Literal["order", "frequency"]
+    position: float
+
+
+@dataclass(frozen=True)
 class View:
     """The signal over which an effect shows itself in a figure.
 

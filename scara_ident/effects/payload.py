@@ -107,7 +107,7 @@ class FreePayloadChange(PayloadChange):
 
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
         """Return the torque per standard parameter of the payload from then on."""
-        columns = _body(signals, self._told(signals.scene.robot))
+        columns = body_columns(signals, self._told(signals.scene.robot))
         return np.moveaxis(columns * self.acting(signals, member), 1, 0)
 
     def in_full(self) -> Effect | None:
@@ -199,13 +199,18 @@ class PayloadOfRecordings(Effect):
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
         """Return the torque per standard parameter of the payload in recordings of the group, else zero."""
         names = list(signals.scene.start)
-        shown = self._told(signals.scene.robot)
         name = signals.motion.name
         if name not in names or not member.partner_place >> names.index(name) & 1:
-            return np.zeros((len(shown), *signals.motion.q.shape))
-        if self.at_tool:
-            return [_at_tool(signals)]
-        return np.moveaxis(_body(signals, shown), 1, 0)
+            return np.zeros((len(self._told(signals.scene.robot)), *signals.motion.q.shape))
+        return self.carried(signals, member)
+
+    def carried(self, signals: Signals, member: Member) -> Iterable[Array]:
+        """Return the torque per standard parameter of the payload, (n, N) each."""
+        return (
+            [_at_tool(signals)]
+            if self.at_tool
+            else np.moveaxis(body_columns(signals, self._told(signals.scene.robot)), 1, 0)
+        )
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """Say so where the mass is negative, or more than the arm weighs."""
@@ -300,7 +305,7 @@ def _at_tool(signals: Signals) -> Array:
     return shared(signals.motion, "payload", make)
 
 
-def _body(signals: Signals, shown: Sequence[int]) -> Array:
+def body_columns(signals: Signals, shown: Sequence[int]) -> Array:
     """Return the torque per standard parameter of a body on the last link, of those shown, shape (n, k, N)."""
     robot = signals.scene.robot
     # Of a planar arm most of the ten are nothing, and are not held.

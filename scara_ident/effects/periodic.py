@@ -9,11 +9,11 @@ from typing import ClassVar
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.effects.effect import DOUBT_STDS, SpectralLine
+from scara_ident.effects.effect import DOUBT_STDS
 from scara_ident.effects.following import EstimateSlopes
 from scara_ident.effects.friction import friction_places, friction_slope
 from scara_ident.effects.links import behind, rigid_slopes
-from scara_ident.effects.parameters import Member, NonlinearParameter, Parameter, View
+from scara_ident.effects.parameters import Member, NonlinearParameter, Parameter, SpectralLine, View
 from scara_ident.effects.signals import Scene, Signals
 from scara_ident.effects.sinusoid import Sinusoid, least_amplitude, sine_and_cosine, sines
 from scara_ident.effects.spectra import HIGHEST_FREQUENCY_SHARE

@@ -40,3 +40,5 @@ def test_a_step_goes_no_further_than_a_bound_and_than_the_linear_model_holds() -
     assert Unknown(0, 0, 0.006, 0.005, 0.9).room == pytest.approx((-0.001, LONGEST_STEP * 0.006))
     # What is zero has no size that a share could be of.
     assert Unknown(0, 0, 0.0, -0.1, 0.1).room == (-0.1, 0.1)
+    # What may have either sign is no larger for being far from zero, and goes as far from beside it.
+    assert Unknown(0, 0, 1e-3, -1.0, 1.0).room == pytest.approx((-1.0, 0.999), rel=1e-2)

@@ -48,7 +48,7 @@ def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
 def test_families_of_one_name_come_together():
     assert available_effects()[: len(CATALOGUE)] == CATALOGUE
     assert effects_named("spring") == tuple(effect for effect in CATALOGUE if effect.name == "spring")
-    assert len(effects_named("payload_change", "base_tilt")) == 6
+    assert len(effects_named("payload_change", "base_tilt")) == 7
     with pytest.raises(UsageError, match="effect 'sprign': did you mean spring"):
         effects_named("spring", "sprign")
 

@@ -48,7 +48,8 @@ def scene_of_ur5():
 def members(effect, scene):
     if effect.by_recording:
         # Which, the torque of recordings would tell.
-        return (effect.in_recordings(scene, Member(None), frozenset(["m"])),)
+        own = Member(None, (0.1,) * len(effect.nonlinear))
+        return (effect.in_recordings(scene, own, frozenset(["m"])),)
     line = SpectralLine(effect.seeded_by or "order", 3.0)
     return effect.members(scene)[::5] or effect.seeds(scene, 0, line)
 
