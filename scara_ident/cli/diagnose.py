@@ -95,9 +95,11 @@ def diagnose(
         console = result_console(content, json)
         if verbose:
             show_recordings(console, (*training, *held_out))
+        first, others = content["doubts"], content["summary"][len(content["doubts"]) :]
+        console.say(first)
         console.note([*useless, *more, *result.notes])
         console.print(f"{arm.name}: {result.verdict}", style="bold")
-        console.say(content["summary"])
+        console.say(others)
         for each in tables(content, all_candidates=verbose):
             console.print(each)
         if output is not None:

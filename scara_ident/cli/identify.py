@@ -44,7 +44,7 @@ def identify(
             from scara_ident.estimation.consistent.options import ConsistentOptions
             from scara_ident.files import write_json, write_text
             from scara_ident.identification.identify import identify as run
-            from scara_ident.report.identification import identification_dict, sentences
+            from scara_ident.report.identification import identification_dict
             from scara_ident.report.told.identification import bands_said, tables
 
             (training, useless), (held_out, more) = wanted()
@@ -62,11 +62,13 @@ def identify(
     console = result_console(content, json)
     if verbose:
         show_recordings(console, (*training, *held_out))
+    first, others = content["doubts"], content["summary"][len(content["doubts"]) :]
+    console.say(first)
     console.note([*useless, *more, *result.notes])
     for each in tables(result):
         console.print(each)
     console.print(bands_said(result))
-    console.say(sentences(result))
+    console.say(others)
     if output is not None:
         from scara_ident.export.identified_model import identified_model
         from scara_ident.export.robots import robot_files

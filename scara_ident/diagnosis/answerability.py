@@ -23,6 +23,7 @@ import numpy as np
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, Rows, with_columns
 from scara_ident.diagnosis.diagnose import Diagnosis
+from scara_ident.diagnosis.finite_columns import torque_slope
 from scara_ident.diagnosis.questions import (
     Question,
     Suspect,
@@ -152,11 +153,11 @@ class Inquiry:
         found = iter(made(wanted))
         result = []
         for item in self.suspects:
-            wide = dict(next(found))
+            own = next(found)
+            wide = dict(own)
             for _, _, reach in self._freed_sides(item):
-                up, down = next(found), next(found)
-                for joint in wide:
-                    change = np.asarray(item.value) @ (up[joint] - down[joint]) / (2.0 * reach)
+                pair = next(found), next(found)
+                for joint, change in torque_slope(np.asarray(item.value), own, pair, reach).items():
                     wide[joint] = np.concatenate([wide[joint], change[None]])
             result.append(wide)
         return result

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
+from scara_ident.diagnosis.finite_columns import finite_or_zero, is_finite
 from scara_ident.effects import Effect, EffectTerm, Member, Scene, Signals
 from scara_ident.effects.links import forget_shared
 from scara_ident.effects.signals import LinkTorque
@@ -79,7 +81,8 @@ class Candidate:
 class CandidateColumns:
     """The columns of candidates on the rows of observations, each made once per value of its nonlinear parameters.
 
-    Columns that follow the estimate, such as those of a gear's load, are made again when it changes.
+    Columns that follow the estimate, such as those of a gear's load, are made again when it changes. Those that are not finite
+    somewhere are zero everywhere, so that what they belong to removes nothing, see `not_finite_on`.
 
     Attributes
     ----------
@@ -90,6 +93,7 @@ class CandidateColumns:
     observations: Observations
     _rows: dict[Key, Rows] = field(default_factory=dict, repr=False)
     _raw: dict[Key, tuple[Rows, ...]] = field(default_factory=dict, repr=False)
+    _not_finite: dict[Key, tuple[str, ...]] = field(default_factory=dict, repr=False)
     _signals: dict[Motion, Signals] = field(default_factory=dict, init=False, repr=False)
     _at: dict[tuple[float | None, ...], CandidateColumns] = field(default_factory=dict, init=False, repr=False)
 
@@ -120,7 +124,7 @@ class CandidateColumns:
 
     def beside(self, observations: Observations) -> CandidateColumns:
         """Return the same columns beside other torques on the same motion."""
-        return CandidateColumns(observations, self._rows, self._raw)
+        return CandidateColumns(observations, self._rows, self._raw, self._not_finite)
 
     def rows(self, scene: Scene, candidates: Sequence[Candidate]) -> list[Rows]:
         """Return the columns of candidates within the bands, on the rows of each joint that they act on."""
@@ -132,13 +136,20 @@ class CandidateColumns:
         self._make(scene, [item for item in candidates if _key(scene, item) not in self._raw], keep=True)
         return [self._raw[_key(scene, item)] for item in candidates]
 
+    def not_finite_on(self, scene: Scene, candidate: Candidate) -> tuple[str, ...]:
+        """Return the recordings on which columns that were made are not finite."""
+        return self._not_finite.get(_key(scene, candidate), ()) if self._not_finite else ()
+
     def of_torque(self, scene: Scene, candidate: Candidate, torques: Sequence[Array]) -> Rows:
         """Return what torques of effects on every stretch, shape (n, N), add to a candidate's columns within the bands, see `Effect.of_torque`."""
         effect, member, found = candidate.effect, candidate.member, list[list[Array]]()
         for part, torque in zip(self.observations.data.stretches, torques, strict=True):
-            added = effect.of_torque(self._signals_of(scene, part), member, torque) if part.usable else None
+            if not part.usable:
+                continue
+            with np.errstate(all="ignore"):
+                added = effect.of_torque(self._signals_of(scene, part), member, torque)
             if added is not None:
-                found.append([part.rows(joint, rows) for joint, rows in enumerate(added)])
+                found.append([part.rows(joint, finite_or_zero(rows)) for joint, rows in enumerate(added)])
         return {joint: np.concatenate(parts, axis=1) for joint, parts in enumerate(zip(*found, strict=True))}
 
     def slopes(self, scene: Scene, candidate: Candidate) -> Rows:
@@ -149,8 +160,13 @@ class CandidateColumns:
 
         def on_stretch(part: PreparedStretch) -> dict[int, tuple[NDArray[np.intp], Array]]:
             every = part.decimation if effect.smooth else 1
-            each = enumerate(effect.slopes(self._signals_of(scene, part, smooth=effect.smooth), member))
-            return {joint: (places, part.rows(joint, rows, every)) for joint, (places, rows) in each if len(places)}
+            with np.errstate(all="ignore"):
+                each = enumerate(effect.slopes(self._signals_of(scene, part, smooth=effect.smooth), member))
+                return {
+                    joint: (places, part.rows(joint, finite_or_zero(rows), every))
+                    for joint, (places, rows) in each
+                    if len(places)
+                }
 
         return self._joined(on_stretch, len(tie.slopes))
 
@@ -159,8 +175,9 @@ class CandidateColumns:
         effect, member = candidate.effect, candidate.member
 
         def on_stretch(part: PreparedStretch) -> dict[int, tuple[NDArray[np.intp], Array]]:
-            each = effect.estimate_slopes(self._signals_of(scene, part), member, value).items()
-            return {joint: (places, part.rows(joint, rows)) for joint, (places, rows) in each}
+            with np.errstate(all="ignore"):
+                each = effect.estimate_slopes(self._signals_of(scene, part), member, value)
+            return {joint: (places, part.rows(joint, finite_or_zero(rows))) for joint, (places, rows) in each.items()}
 
         return self._joined(on_stretch, len(scene.value))
 
@@ -199,7 +216,7 @@ class CandidateColumns:
             return
         stretches = self.observations.data.stretches
 
-        def on_stretch(part: PreparedStretch) -> tuple[list[Rows], list[Rows]]:
+        def on_stretch(part: PreparedStretch) -> tuple[list[Rows], list[Rows], set[int]]:
             return self._on_stretch(scene, wanted, part, keep=keep)
 
         if len(wanted) < WORTH_A_PROCESS:
@@ -208,18 +225,27 @@ class CandidateColumns:
             made = halved(on_stretch, stretches, [part.samples for part in stretches])
         for k, candidate in enumerate(wanted):
             key = _key(scene, candidate)
-            parts = [rows[k] for rows, _ in made]
+            parts = [rows[k] for rows, _, _ in made]
             used = [part for part, stretch in zip(parts, stretches, strict=True) if stretch.usable]
             self._rows[key] = {j: np.concatenate([part[j] for part in used], axis=1) for j in parts[0]}
             if keep:
-                self._raw[key] = tuple(raws[k] for _, raws in made)
+                self._raw[key] = tuple(raws[k] for _, raws, _ in made)
+            places = dict.fromkeys(
+                part.name for part, (_, _, lacking) in zip(stretches, made, strict=True) if k in lacking
+            )
+            if places:
+                self._not_finite[key] = tuple(places)
+                self._rows[key] = _zeros(self._rows[key])
+                if keep:
+                    self._raw[key] = tuple(_zeros(rows) for rows in self._raw[key])
 
     def _on_stretch(
         self, scene: Scene, candidates: Sequence[Candidate], part: PreparedStretch, *, keep: bool
-    ) -> tuple[list[Rows], list[Rows]]:
-        """Return every candidate's columns within the bands and, if they are to be kept, as they are."""
+    ) -> tuple[list[Rows], list[Rows], set[int]]:
+        """Return every candidate's columns within the bands, if they are to be kept as they are, and whose are not finite."""
         kept: list[Rows] = [{} for _ in candidates]
         unfiltered: list[Rows] = [{} for _ in candidates]
+        lacking: set[int] = set()
         # By how many samples one stands for: candidate, joint, and columns that have not passed the low-pass yet.
         waiting: dict[int, list[tuple[int, int, list[Array]]]] = {}
 
@@ -234,11 +260,15 @@ class CandidateColumns:
         for k, candidate in enumerate(candidates):
             every = part.decimation if candidate.effect.smooth and part.usable else 1
             if keep or every == 1:
-                made = candidate.effect.by_joint(self._signals_of(scene, part), candidate.member)
+                made = self._by_joint(scene, candidate, part)
                 if keep:
                     unfiltered[k] = {joint: np.array(columns) for joint, columns in made.items()}
             if every > 1:
-                made = candidate.effect.by_joint(self._signals_of(scene, part, smooth=True), candidate.member)
+                made = self._by_joint(scene, candidate, part, smooth=True)
+            if not all(is_finite(column) for column in chain(*made.values(), *unfiltered[k].values())):
+                lacking.add(k)
+                # What is no number would be in all that passes the low-pass with it.
+                made = {joint: [np.zeros_like(column) for column in columns] for joint, columns in made.items()}
             for joint, columns in made.items():
                 if part.usable:
                     waiting.setdefault(every, []).append((k, joint, columns))
@@ -249,7 +279,15 @@ class CandidateColumns:
                 flush()
                 count = 0
         flush()
-        return kept, unfiltered
+        return kept, unfiltered, lacking
+
+    def _by_joint(
+        self, scene: Scene, candidate: Candidate, part: PreparedStretch, *, smooth: bool = False
+    ) -> dict[int, list[Array]]:
+        signals = self._signals_of(scene, part, smooth=smooth)
+        # What divides by zero or overflows is seen in the columns.
+        with np.errstate(all="ignore"):
+            return candidate.effect.by_joint(signals, candidate.member)
 
     def _signals_of(self, scene: Scene, part: PreparedStretch, *, smooth: bool = False) -> Signals:
         """Return the signals of a stretch, or of its decimated motion; those of the last estimate are kept with all that was made."""
@@ -307,9 +345,13 @@ class CandidateColumns:
                 for beside in ((), scene.together)
             ),
         }
-        for held in (self._rows, self._raw):
+        for held in (self._rows, self._raw, self._not_finite):
             for key in [key for key in held if key[2] not in current]:
                 del held[key]
+
+
+def _zeros(rows: Rows) -> Rows:
+    return {joint: np.zeros_like(own) for joint, own in rows.items()}
 
 
 def _cuts(observations: Observations) -> set[float | None]:

@@ -35,7 +35,7 @@ from scara_ident.diagnosis.whole_estimate import with_whole_estimate
 from scara_ident.diagnosis.work import first, searching
 from scara_ident.effects import Effect, EffectTerm
 from scara_ident.effects.aliases import Alias, aliases
-from scara_ident.effects.catalogue import available_effects
+from scara_ident.effects.catalogue import CATALOGUE, available_effects
 from scara_ident.errors import ArgumentError, RecordingError, UsageError
 from scara_ident.estimation import Estimate
 from scara_ident.estimation.observations import Observations, observe
@@ -198,6 +198,8 @@ def diagnose(
     RecordingError
         If none of the recordings can be used, or they have fewer rows than the model has parameters (one of several that
         cannot be used is left out with a note), or channels are not what the mapping says (see `channel_faults`).
+    ScaraIdentError
+        If an effect has no finite columns on a joint, and ``catalogue`` names some; one of all is left out with a note.
 
     Examples
     --------
@@ -238,7 +240,9 @@ def diagnose(
     notes[:0] = (*robot.notes, *base.notes)
     known = frozenset(unloaded)
     families = tuple(item.knowing(known) for item in families)
-    task = SearchTask(base, families, criteria, searching(work, band_given=given))
+    # Who gives all that is built in, and more, asks for none of it.
+    chosen = catalogue is not None and not set(CATALOGUE) <= set(catalogue)
+    task = SearchTask(base, families, criteria, searching(work, band_given=given), chosen)
     outcome, events = _without_events(task, observations, free=not given)
     work("comparing what was found with what else it could be", task.progress.stop)
     found = outcome.search
@@ -310,7 +314,7 @@ def _without_events(task: SearchTask, observations: Observations, *, free: bool)
 def _remarks(outcome: Outcome, parameters: PhysicalParameters) -> list[str]:
     """Return what else there is to say of a search and what it leaves, in words."""
     found, after, left = outcome.search, outcome.after, outcome.unexplained
-    robot, notes = found.scene.robot, []
+    robot, notes = found.scene.robot, [*found.notes]
     drift = clock_drift(after.value, outcome.training)
     if drift is not None:
         notes.append(drift)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.candidate_tests import examine
 from scara_ident.diagnosis.candidates import Candidate, Rows
+from scara_ident.diagnosis.finite_columns import torque_slope
 from scara_ident.diagnosis.linearised import Linearised, linearise, with_estimate_slopes
 from scara_ident.diagnosis.nonlinear_fit import tune
 from scara_ident.diagnosis.selection_step import SelectionStep
@@ -234,9 +235,8 @@ def parameters_beside(step: SelectionStep, candidate: Candidate) -> dict[str, Pa
     wide: Rows = {joint: rows for joint, rows in own.items()}
     size = len(alone.value)
     for one, other, reach in sides(candidate):
-        up, down = step.rows(step.scene, [one, other])
-        for joint in wide:
-            change = alone.value @ (up[joint] - down[joint]) / (2.0 * reach)
+        pair = step.rows(step.scene, [one, other])
+        for joint, change in torque_slope(alone.value, own, pair, reach).items():
             wide[joint] = np.concatenate([wide[joint], change[None]])
     (found,) = examine(step.model, [wide], step.criteria)
     covariance = found.covariance[:size, :size]

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, Rows, with_columns
+from scara_ident.diagnosis.finite_columns import torque_slope
 from scara_ident.diagnosis.fitted_model import FittedModel
 from scara_ident.diagnosis.selection_step import SelectionStep
 from scara_ident.diagnosis.trust_region import least_squares, length, within_radius
@@ -347,15 +348,14 @@ def _change(
                 for joint, own in slopes[owner].items():
                     total[joint] = total.get(joint, 0.0) + factor * own[which]
             continue
-        sides: list[Rows] = []
+        (middle,), sides = columns.rows(scene, [chosen[owner]]), list[Rows]()
         for sign in (1.0, -1.0):
             at = item.value + sign * item.step
             if item.owner is None:
                 sides += columns.rows(_with_armature(scene, item.place, float(np.exp(at))), [chosen[owner]])
             else:
                 sides += columns.rows(scene, [moved_candidate(chosen[owner], item.place, at)])
-        for joint in sides[0]:
-            change = value[place] @ (sides[0][joint] - sides[1][joint]) / (2.0 * item.step)
+        for joint, change in torque_slope(value[place], middle, sides, item.step).items():
             total[joint] = total.get(joint, 0.0) + change
     return total
 

@@ -12,6 +12,7 @@ from scara_ident.diagnosis.answerability import inquire
 from scara_ident.diagnosis.diagnose import Diagnosis
 from scara_ident.diagnosis.questions import HALF_THE_SPEED, Question, possible, questions
 from scara_ident.diagnosis.selection_step import best_of_each
+from scara_ident.diagnosis.tentative import settled_by
 from scara_ident.manners import listed
 from scara_ident.threads import one_blas_thread
 
@@ -165,7 +166,7 @@ def _faint(diagnosis: Diagnosis) -> Iterator[NextStep]:
         elif decision.gain > 0.0 and _significant(decision, diagnosis) and possible(decision, diagnosis):
             faint.setdefault(name, []).append(decision)
     for members in list(faint.values())[:MOST]:
-        yield NextStep(f"to judge {with_reasons(members)}", members[0].candidate.effect.experiment)
+        yield NextStep(f"to judge {with_reasons(members)}", settled_by(diagnosis.search, members[:MOST_LABELS]))
     for members in list(hidden.values())[:MOST]:
         labels = listed([member.label for member in members], MOST_LABELS, " and ")
         said = f"to see {labels} at all, which these recordings cannot show"

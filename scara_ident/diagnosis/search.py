@@ -18,6 +18,7 @@ from scara_ident.diagnosis.exchange import best_exchange, needed
 from scara_ident.diagnosis.interval_fit import refined
 from scara_ident.diagnosis.lines import line_candidates
 from scara_ident.diagnosis.nonlinear_fit import tune
+from scara_ident.diagnosis.not_finite import without_not_finite
 from scara_ident.diagnosis.search_state import SearchState, Step
 from scara_ident.diagnosis.selection_step import SelectionStep, best_of_each, model_with
 from scara_ident.diagnosis.work import after_rounds
@@ -61,6 +62,8 @@ class Search:
         What those that stayed may stand for, see `Effect.doubtful`.
     passed : tuple of (str, SearchState)
         The label of every effect that came in, in their order, and where the search stood before.
+    notes : tuple of str
+        What of the catalogue could not be tried.
     """
 
     step: SelectionStep
@@ -72,6 +75,7 @@ class Search:
     first: Scene
     doubtful: tuple[Candidate, ...]
     passed: Passed
+    notes: tuple[str, ...] = ()
 
     @property
     def scene(self) -> Scene:
@@ -141,12 +145,15 @@ class SearchTask:
     criteria : SelectionCriteria
     progress : Work
         Told every step that begins.
+    asked_for : bool
+        Whether somebody chose the families, so that one that cannot be tried is an error and no note.
     """
 
     model: TorqueModel
     catalogue: tuple[Effect, ...] = field(default_factory=available_effects)
     criteria: SelectionCriteria = CRITERIA
     progress: Work = field(default_factory=Work)
+    asked_for: bool = False
 
 
 def search(task: SearchTask, columns: CandidateColumns, *, known: Search | None = None) -> Search:
@@ -159,6 +166,11 @@ def search(task: SearchTask, columns: CandidateColumns, *, known: Search | None 
         On the rows of the base model.
     known : Search, optional
         An earlier one in other bands, where fits may begin.
+
+    Raises
+    ------
+    ScaraIdentError
+        If no member of a family that was asked for has finite columns on a joint.
     """
     observations = columns.observations
     start = wls(observations)
@@ -171,10 +183,13 @@ def search(task: SearchTask, columns: CandidateColumns, *, known: Search | None 
     candidates = () if columns.unresolved_for(None) is not None else pool
     task.progress(f"making the columns of {len(candidates)} candidates", 0.0)
     columns.rows(scene, candidates)
+    candidates, notes = without_not_finite(scene, columns, candidates, asked_for=task.asked_for)
+    if notes:
+        pool = tuple(item for item in pool if not columns.not_finite_on(scene, item))
     tried = max(1, len(candidates))
     step = SelectionStep(scene, columns, (), start.weights, tried, task.criteria, start.offsets)
     state = SearchState(step, start.value, pool, candidates)
-    return _searched(task, _Base(start, observations, scene), state, known, frozenset(), ())
+    return _searched(task, _Base(start, observations, scene, notes), state, known, frozenset(), ())
 
 
 def search_again(
@@ -195,17 +210,18 @@ def search_again(
     place = next((k for k, (label, _) in enumerate(found.passed) if label in gone), 0)
     state = found.passed[place][1]
     state = state.with_more([item for item in _beginnings(found) if item not in state.pool]).exchanged(instead)
-    base = _Base(found.start, found.uncorrected, found.first)
+    base = _Base(found.start, found.uncorrected, found.first, found.notes)
     return _searched(task, base, state.only({*without, *state.labels}), found, frozenset(without), found.passed[:place])
 
 
 @dataclass(frozen=True, eq=False)
 class _Base:
-    """What a search begins from: the base model fitted, its rows, and the scene that all columns are made at."""
+    """What a search begins from: the base model fitted, its rows, the scene that all columns are made at, and what is not tried."""
 
     start: Estimate
     uncorrected: Observations
     first: Scene
+    notes: tuple[str, ...]
 
 
 def _beginnings(known: Search) -> list[Candidate]:
@@ -277,6 +293,7 @@ def _searched(
         base.first,
         doubtful,
         passed,
+        base.notes,
     )
 
 

@@ -27,6 +27,8 @@ from scara_ident.motion.prepared import PreparedData
 
 # Points on a line from one neighbouring scan point to the other: with the middle one three on either side.
 LINE_POINTS = 7
+# Of what is zero in the place of columns that are not finite, which say nothing of whether it is there.
+NOT_FINITE = "its columns are not finite"
 # Lines, each a third as long as the last: together they narrow a scan's spacing 27 times, and `tune` does the rest.
 LINE_ROUNDS = 4
 
@@ -175,10 +177,15 @@ class SelectionStep:
         for k, (result, gain) in enumerate(zip(found, gained, strict=True)):
             if self.in_doubt(result, gain):
                 found[k] = examine_rows(model, rows[k], result)
-        return [
+        decided = [
             decide(item, result, gain, self.scene, self.tried, self.criteria)
             for item, result, gain in zip(candidates, found, gained, strict=True)
         ]
+        return [replace(item, why=NOT_FINITE) if self._not_finite(item.candidate, first) else item for item in decided]
+
+    def _not_finite(self, candidate: Candidate, first: Scene | None) -> bool:
+        scenes = (self.scene,) if first is None else (self.scene, first)
+        return any(self.columns.not_finite_on(scene, candidate) for scene in scenes)
 
     def in_doubt(self, found: Examination, gain: float) -> bool:
         """Whether a candidate that removes nearly all of its joint's residual is not significant by blocks of time."""

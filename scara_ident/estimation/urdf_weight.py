@@ -60,6 +60,19 @@ def told_scale(estimate: Estimate, observations: Observations) -> str:
     return f"{said} {_loaded_sentence(loaded, observations.model.robot)}" if loaded else said
 
 
+def turned_bodies(estimate: Estimate, observations: Observations) -> tuple[str, ...]:
+    """Return the joints on which torques of the bodies have the opposite sign of the URDF's, and no friction says that efforts have theirs.
+
+    Where it brakes a centre of mass may lie elsewhere, and where the bodies make little one that is a little off does.
+    """
+    seen = estimate, observations
+    turned = [joint for joint, scale in urdf_scale(*seen).items() if scale < 0.0]
+    if not turned:
+        return ()
+    explained = {*friction_sides(*seen).brakes, *slight_joints(*seen), *otherwise_loaded(*seen)}
+    return tuple(joint for joint in turned if joint not in explained)
+
+
 def otherwise_loaded(estimate: Estimate, observations: Observations) -> dict[str, WeightScale]:
     """Return the joints whose weight is surely not the URDF's while their inertia is about that, which no gain makes."""
     observations = observations.in_memory

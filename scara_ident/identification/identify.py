@@ -67,7 +67,7 @@ class Identification(Saved, told_by="identification"):
     events : tuple of Event
         What is local in time: left out of the fit, or in recordings that were held out.
     channels : tuple of ChannelFault
-        Signs that seem to be opposite; they are in the notes too.
+        Signs that seem to be opposite.
     """
 
     estimate: Estimate
@@ -208,7 +208,6 @@ def identify(
     faults = channel_faults(training)
     refuse_exchanged(faults)
     notes[:0] = (*robot.notes, *equation.notes)
-    notes += [str(fault) for fault in faults]
     progress("looking for events", 0.6)
     # With a wrong sign or exchanged joints nothing is explained anywhere.
     robust = None if faults else robust_fit(training)
@@ -249,7 +248,7 @@ def identify(
     notes += event_notes(robot, events) + [said for said in (differs, drift) if said is not None]
     if isinstance(estimate, ConsistentEstimate):
         notes += estimate.notes
-    log_notes(_LOG, notes)
+    log_notes(_LOG, (*map(str, faults), *notes))
     log_det, condition = paper_criteria(training)
     return Identification(
         estimate, history, data.bands, training, validated, noise, log_det, condition, tuple(notes), events, faults

@@ -7,6 +7,7 @@ depends on it is the more wrong the larger it is. How wrong is seen by adding as
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from weakref import WeakKeyDictionary
 
@@ -50,6 +51,8 @@ ALIKE = 0.5
 # A torque that swings acts on other joints as it is, times how much farther the masses that it swings lie from their axes than from
 # its own: the reach of an arm over that of its wrist. One that is less than theirs by more does not shake them.
 LEVER = 10.0
+# A joint that travels by a smaller share of what it can, or of a turn, hardly moves: further is better before finer.
+LITTLE = 0.1
 # Time over which a joint's speed is taken, s, in which the steps of its encoder hardly count.
 SPEED_OVER = 0.1
 
@@ -60,7 +63,7 @@ def coarse_positions(item: PreparedRecording) -> str | None:
     Returns
     -------
     str or None
-        Which, by which step, and what to do; None where all are fine enough.
+        Which, by which step, and what to do; None where all are fine enough. Which joints slide, and how far, is not asked here.
     """
     part = item.longest
     nyquist = 0.5 * part.rate
@@ -75,14 +78,29 @@ def coarse_positions(item: PreparedRecording) -> str | None:
         noise = step / np.sqrt(12.0) * 2.0 * np.pi * np.sqrt(cut**3 / (3.0 * nyquist))
         speed = np.sqrt(np.mean((position[apart:] - position[:-apart]) ** 2)) * part.rate / apart
         if max(REST_NOISE * noise, slow[joint]) > speed > 0.0:
-            found.append((item.recording.joints[joint], step, part.bands[joint]))
+            found.append((item.recording.joints[joint], step, part.bands[joint], float(np.ptp(position))))
+    said = [
+        _too_coarse([each for each in found if (each[3] < LITTLE * 2.0 * np.pi) is little], little=little)
+        for little in (True, False)
+    ]
+    return "; ".join(each for each in said if each) or None
+
+
+def _too_coarse(found: Sequence[tuple[str, float, float | None, float]], *, little: bool) -> str:
+    """Say what to do about joints with their steps, bands and ways, all of which move little or none."""
     if not found:
-        return None
-    joints, (_, step, band) = ", ".join(name for name, _, _ in found), found[0]
+        return ""
+    joints, (_, step, band, way) = ", ".join(name for name, *_ in found), found[0]
     within = "without a low-pass" if band is None else f"in a band of {band:.3g} Hz"
+    told = f"{within} rest and motion cannot be told apart"
+    if little:
+        return (
+            f"positions of {joints} move by {way:.2g} (rad or m) in all, in steps of {step:.2g}, so little that {told}; "
+            "move further and faster, or give a narrower band"
+        )
     return (
-        f"positions of {joints} go in steps of {step:.2g} (rad or m), so coarse that {within} rest and motion cannot be told "
-        "apart; record with a finer encoder, faster motion, or give a narrower band"
+        f"positions of {joints} go in steps of {step:.2g} (rad or m), so coarse that {told}; record with a finer encoder, "
+        "faster motion, or give a narrower band"
     )
 
 

@@ -18,7 +18,7 @@ Both are of finite length, so that all there is to remember is the last raw samp
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -92,6 +92,16 @@ class RowFilter:
     def bridged(self) -> int:
         """Lost raw samples in a row that are bridged; after more of them the filter begins anew."""
         return int(BRIDGED * self.rate / self.cut)
+
+    @cached_property
+    def acceleration_gain(self) -> float:
+        """Variance of the accelerations under a row's pulse by white noise of the positions, over that of torques by theirs, 1/s^4."""
+        samples = self.pulses.shape[1]
+        raw = np.zeros(((samples - 1) * self.every + len(self.taps), 2))
+        for k, size in enumerate(self.pulses[0]):
+            raw[k * self.every : k * self.every + len(self.taps)] += size * self.taps[:, [0, 2]]
+        torque, acceleration = np.sum(raw**2, axis=0)
+        return float(acceleration / torque)
 
     def motion(self, window: Array) -> Motion:
         """Return the filtered motion and torque of raw positions and torques, shape (2, n, `window`)."""

@@ -7,8 +7,9 @@ sample would give, for a tenth of the time. Innovations of a block feed the dete
 from __future__ import annotations
 
 import json
+import logging
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, astuple, dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -19,15 +20,24 @@ from scara_ident.errors import UsageError
 from scara_ident.estimation.information import triangular
 from scara_ident.files import write_whole
 from scara_ident.model.model import TorqueModel
-from scara_ident.motion.motion import Motion
 from scara_ident.online.detector import Alarm, Averages, threshold
 from scara_ident.online.filtered import RowFilter
-from scara_ident.online.noise import GIVEN_ROWS, GIVEN_SAMPLES, PositionNoise, TorqueNoise
+from scara_ident.online.noise import (
+    GIVEN_ROWS,
+    GIVEN_SAMPLES,
+    PositionNoise,
+    TorqueNoise,
+    inertia_at,
+    too_wide,
+)
+from scara_ident.online.sampled import rows_of_samples
 from scara_ident.online.settings import OnlineSettings
 from scara_ident.online.state import Memory
 from scara_ident.online.suspects import Suspects, suspects_of
+from scara_ident.progress import log_notes
 from scara_ident.threads import one_blas_thread
 
+_LOG = logging.getLogger(__name__)
 # A joint slower than this share of its velocity limit counts as at rest, where friction is unknown.
 REST_SHARE = 3e-3
 
@@ -79,7 +89,7 @@ class OnlineIdentifier:
         shape = (int(self.settings.block), 4) if self._filter is None else (self._filter.window, 2)
         self._buffer = np.zeros((*shape, joints))
         self._position_noise = PositionNoise.none(joints)
-        self._filled = self._samples = self._seen = self._lost = 0
+        self._filled = self._samples = self._seen = self._lost = self._told = 0
 
     def update(self, q: ArrayLike, v: ArrayLike | None, a: ArrayLike | None, effort: ArrayLike) -> Alarm | None:
         """Take in one sample.
@@ -164,6 +174,16 @@ class OnlineIdentifier:
         """Standard deviation of each parameter, shape (p,)."""
         return np.sqrt(np.diag(self.covariance))
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What of the settings does not go with what was taken in so far; the first time it is logged as a warning too."""
+        band, joints = self.settings.band, self.model.robot.joints
+        if band is None:
+            return ()
+        seen, rows = self._noise.seen(GIVEN_ROWS), self._noise.counted - GIVEN_ROWS
+        said = too_wide(self._position_noise.in_rows, seen, rows, band, joints)
+        return () if said is None else (said,)
+
     def forget(self, share: float) -> None:
         """Let all that is known weigh only a share, as when a part was exchanged.
 
@@ -185,8 +205,8 @@ class OnlineIdentifier:
             "scores": self._averages.scores,
             "information": self._averages.information,
             "torque_noise": np.array([self._noise.squares, self._noise.counted]),
-            "position_noise": np.array([self._position_noise.squares, self._position_noise.counted]),
-            "counts": np.array([self._filled, self._samples, self._seen, self._lost]),
+            "position_noise": np.array(astuple(self._position_noise)),
+            "counts": np.array([self._filled, self._samples, self._seen, self._lost, self._told]),
             "buffer": self._buffer[: self._filled],
             "noise": np.asarray(self.noise, dtype=float),
             "settings": np.array(json.dumps(asdict(self.settings))),
@@ -221,7 +241,7 @@ class OnlineIdentifier:
         found._memory = Memory(state["factor"])
         found._averages = Averages(state["vector"], state["scores"], state["information"])
         found._noise, found._position_noise = noise
-        found._filled, found._samples, found._seen, found._lost = (int(x) for x in state["counts"])
+        found._filled, found._samples, found._seen, found._lost, found._told = (int(x) for x in state["counts"])
         found._buffer[: found._filled] = state["buffer"]
         return found
 
@@ -242,7 +262,11 @@ class OnlineIdentifier:
 
         Samples at rest count for nothing.
         """
-        tables, moving = self._sampled() if self._filter is None else self._filtered(self._filter)
+        if self._filter is None:
+            signals, rate = self._buffer[: self._filled], self.settings.rate
+            tables, moving = rows_of_samples(self.model, signals, self._rest, self._weight, rate)
+        else:
+            tables, moving = self._filtered(self._filter)
         rows, parameters = [], len(self.model.columns)
         for own, table in zip(self.model.active, tables, strict=True):
             factor = triangular(table)
@@ -251,20 +275,8 @@ class OnlineIdentifier:
             rows.append(wide)
         return rows, moving
 
-    def _sampled(self) -> tuple[list[Array], Array]:
-        """Return each joint's rows at every sample, shape (N, k + 1), and how many of them count."""
-        q, v, a, effort = np.ascontiguousarray(self._buffer[: self._filled].transpose(1, 2, 0))
-        motion = Motion("online", "online", np.arange(float(self._filled)), q, v, a, None, self.settings.rate)
-        tables = [np.empty((len(own) + 1, self._filled)) for own in self.model.active]
-        self.model.joint_columns(motion, [table[:-1] for table in tables])
-        moving = np.abs(v) > self._rest[:, None]
-        for table, torque, moves, weight in zip(tables, effort, moving, self._weight, strict=True):
-            table[-1] = torque
-            table *= np.where(moves, weight, 0.0)
-        return [table.T for table in tables], np.count_nonzero(moving, axis=1)
-
     def _filtered(self, way: RowFilter) -> tuple[list[Array], Array]:
-        """Return the same of the rows that a filter makes."""
+        """Return each joint's rows that a filter makes, shape (N, k + 1), and their numbers."""
         window = np.ascontiguousarray(self._buffer.transpose(1, 2, 0))
         motion = way.motion(window)
         self._position_noise = self._position_noise.after(window, motion, self._rest, way)
@@ -364,6 +376,13 @@ class OnlineIdentifier:
             starts = np.cumsum([0, *map(len, parts[:-1])])
             squares = np.array([np.sum(own[a:b]) for a, b in zip(starts, [*starts[1:], None], strict=True)])
             self._noise = self._noise.after(self._noise.scale * squares, moving, self.settings.dependent)
+            # Before so many rows inertias may still be far off.
+            counts = np.where(self._noise.counted >= 2.0 * GIVEN_ROWS, moving, 0)
+            inertia = inertia_at(self.model, value, self._buffer[len(self._buffer) // 2, 0])
+            self._position_noise = self._position_noise.after_rows(inertia, self._weight, counts, self._filter)
+            if not self._told and self.notes:
+                self._told = 1
+                log_notes(_LOG, self.notes)
         share = self.settings.share
         self._averages = self._averages.after(products[1:, 0] / np.sqrt(scale), products[1:, 1:], share)
         strength = self._averages.length(share) / self._limit

@@ -21,7 +21,7 @@ from scara_ident.estimation.run_offsets import rms_of
 from scara_ident.estimation.urdf_scale import urdf_scale
 from scara_ident.export.result import KEY, rebuild_entry
 from scara_ident.model.urdf_values import urdf_values
-from scara_ident.report.diagnosis_words import sentences
+from scara_ident.report.diagnosis_words import told
 from scara_ident.report.identification import bias_of
 from scara_ident.report.left_out import left_out_share
 
@@ -37,11 +37,13 @@ def diagnosis_dict(diagnosis: Diagnosis, worth: Mapping[str, Any] | None = None)
     robot = diagnosis.robot
     nominal = urdf_values(diagnosis.after.model)
     suspects = {item.candidate: item for item in suspects_in_model(diagnosis)}
+    first, others = told(diagnosis)
     return {
         "robot": robot.name,
         "model": diagnosis.before.model.name,
         "verdict": diagnosis.verdict,
-        "summary": list(sentences(diagnosis)),
+        "doubts": list(first),
+        "summary": [*first, *others],
         "band_hz": robot.by_joint(diagnosis.search.bands),
         "band_given": diagnosis.bands_given,
         "torque_units": robot.torque_units,

@@ -16,8 +16,8 @@ from scara_ident.diagnosis.outcome import Unexplained
 from scara_ident.effects import Parameter
 from scara_ident.estimation.run_offsets import rms_of
 from scara_ident.estimation.urdf_weight import told_scale
-from scara_ident.identification.gravity_check import gravity_said
 from scara_ident.model.terms.friction import Friction
+from scara_ident.report.doubts import doubts
 from scara_ident.report.identification import bias_said
 from scara_ident.robot.rotors import GUESS_FACTOR
 
@@ -28,7 +28,20 @@ DIFFERENT_STDS = 3.0
 
 
 def sentences(diagnosis: Diagnosis) -> tuple[str, ...]:
-    """Return the result in words."""
+    """Return the result in words, what questions it first."""
+    first, others = told(diagnosis)
+    return (*first, *others)
+
+
+def told(diagnosis: Diagnosis) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the sentences that stand before all else, see `scara_ident.report.doubts`, and all others."""
+    after, held = diagnosis.after, diagnosis.training_after
+    scale = told_scale(after, held)
+    first = doubts(after, held, diagnosis.training_before, scale)
+    return first, (*_others(diagnosis), *([] if scale in first else [scale]))
+
+
+def _others(diagnosis: Diagnosis) -> list[str]:
     found = []
     if diagnosis.verdict == "complete":
         found.append("The model lacks nothing that these recordings can show.")
@@ -84,11 +97,7 @@ def sentences(diagnosis: Diagnosis) -> tuple[str, ...]:
         )
         if not remainder.signals:
             found += [f"To do first: {step.sentence()}" for step in next_steps(diagnosis)[:1]]
-    found.append(told_scale(diagnosis.after, diagnosis.training_after))
-    gravity = gravity_said(diagnosis.training_before)
-    if gravity is not None:
-        found.append(gravity)
-    return tuple(found)
+    return found
 
 
 def quantity(name: str, parameter: Parameter) -> str:

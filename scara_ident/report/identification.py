@@ -18,10 +18,10 @@ from scara_ident.estimation.saved import estimate_dict
 from scara_ident.estimation.urdf_scale import scale_sentence, urdf_scale
 from scara_ident.estimation.urdf_weight import rotor_sentence, told_scale
 from scara_ident.export.result import KEY, rebuild_entry
-from scara_ident.identification.gravity_check import gravity_said
 from scara_ident.identification.identify import Identification, not_told_from_zero, undetermined, worst_validation
 from scara_ident.manners import listed
 from scara_ident.model.urdf_values import urdf_values
+from scara_ident.report.doubts import doubts
 from scara_ident.robot.robot import Robot
 
 # Names in a sentence, at the most.
@@ -43,6 +43,7 @@ def identification_dict(identification: Identification) -> dict[str, Any]:
     robot = identification.model.robot
     possible = identification.physical_consistency
     nominal = urdf_values(identification.model)
+    first, others = told(identification)
     content: dict[str, Any] = {
         "robot": robot.name,
         "model": identification.model.name,
@@ -75,7 +76,8 @@ def identification_dict(identification: Identification) -> dict[str, Any]:
             for kind, items in (("training", identification.training), ("validation", identification.validation))
         },
         "events": [event.entry for event in identification.events],
-        "summary": list(sentences(identification)),
+        "doubts": list(first),
+        "summary": [*first, *others],
         "notes": list(identification.notes),
         "estimate": estimate_dict(estimate),
         KEY: rebuild_entry(estimate, identification.training, identification.validation),
@@ -106,7 +108,26 @@ def _left_out(robot: Robot, item: Observations) -> dict[str, Any]:
 
 
 def sentences(identification: Identification) -> tuple[str, ...]:
-    """Return the result in words: where it generalises worst, and what the data leave open."""
+    """Return the result in words: what questions it, then where it generalises worst, and what the data leave open."""
+    first, others = told(identification)
+    return (*first, *others)
+
+
+def told(identification: Identification) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the sentences that stand before the parameters, see `scara_ident.report.doubts`, and all others."""
+    held, channels = identification.training, identification.channels
+    robot = identification.model.robot
+    # Under efforts of opposite sign bodies and gravity are nobody's.
+    scale = scale_sentence(None, robot) if channels else told_scale(identification.estimate, held)
+    first = doubts(identification.estimate, held, held, scale, channels)
+    others = _others(identification)
+    if scale not in first:
+        others.append(scale)
+    rotors = None if channels else rotor_sentence(identification.estimate, held)
+    return first, (*others, *([] if rotors is None else [rotors]))
+
+
+def _others(identification: Identification) -> list[str]:
     found, robot = [], identification.model.robot
     worst = worst_validation(identification)
     if worst is not None:
@@ -151,19 +172,7 @@ def sentences(identification: Identification) -> tuple[str, ...]:
         found.append(biased)
     if isinstance(identification.estimate, ConsistentEstimate):
         found += _shapes_said(identification.estimate.shapes)
-    if identification.channels:
-        # Under efforts of opposite sign bodies and gravity are nobody's.
-        found.append(scale_sentence(None, robot))
-        return tuple(found)
-    seen = identification.estimate, identification.training
-    found.append(told_scale(*seen))
-    rotors = rotor_sentence(*seen)
-    if rotors is not None:
-        found.append(rotors)
-    gravity = gravity_said(identification.training)
-    if gravity is not None:
-        found.append(gravity)
-    return tuple(found)
+    return found
 
 
 def below_zero_said(estimate: Estimate) -> str | None:

@@ -271,3 +271,34 @@ def test_bands_that_are_left_take_what_only_they_needed_with_them(lower):
     left = {cut for _, cut in part.stretch._filtered}
     assert left < cuts and own <= left and not left & (below - own)
     assert noisier(observations.data) is not drawn
+
+
+class Lost(Spring):
+    """A spring of no number at one moment of one recording."""
+
+    name = "lost"
+
+    def signal_columns(self, signals, member):
+        (turn, *others) = super().signal_columns(signals, member)
+        return [
+            np.where(signals.time == 2.0, np.log(0.0 * turn), turn) if signals.motion.name == "A_2" else turn,
+            *others,
+        ]
+
+
+@pytest.mark.parametrize("count", [3, WORTH_A_PROCESS])
+def test_columns_that_are_not_finite_are_zero_and_those_that_pass_the_filter_with_them_what_they_are(count: int):
+    seen = observed(exact_runs())
+    scene = scene_on(seen.model, wls(seen).value, seen)
+    sound = [Candidate(Stribeck(), Member(0, (0.01 * k,))) for k in range(1, count)]
+    lost = Candidate(Lost(), Member(0))
+    alone, beside = CandidateColumns(seen), CandidateColumns(seen)
+    (zero, *found), expected = beside.rows(scene, [lost, *sound]), alone.rows(scene, sound)
+    assert_array_equal(zero[0], 0.0)
+    for one, other in zip(found, expected, strict=True):
+        # What passes the filter together may be rounded otherwise.
+        assert_allclose(one[0], other[0], rtol=1e-9, atol=1e-15)
+    assert all(not np.any(part[0]) for part in beside.raw(scene, [lost])[0])
+    assert beside.not_finite_on(scene, lost) == ("A_2",)
+    assert not any(beside.not_finite_on(scene, item) for item in sound)
+    assert beside.beside(seen).not_finite_on(scene, lost) == ("A_2",)

@@ -11,7 +11,9 @@ import pytest
 
 from scara_ident.diagnosis import diagnose
 from scara_ident.diagnosis.answerability import inquire
+from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.next_steps import ASKED_MOTION, capital, next_steps, with_reasons
+from scara_ident.diagnosis.noise_check import BY_NOISE
 from scara_ident.effects.position import Spring
 from scara_ident.report.diagnosis import diagnosis_dict
 from scara_ident.report.diagnosis_markdown import diagnosis_markdown
@@ -107,3 +109,16 @@ def test_a_sentence_begins_with_a_capital_unless_it_begins_with_a_name():
     assert capital("spring or offset") == "Spring or offset"
     assert capital("shoulder_pan_joint: friction") == "shoulder_pan_joint: friction"
     assert capital("joint1: friction") == "joint1: friction"
+
+
+def test_what_noise_makes_on_a_joint_that_hardly_moves_asks_to_move_it():
+    """Its experiment would show as little of it, and a finer encoder is not what lacks."""
+    runs = with_torque(exact_runs(size=0.05), 1, lambda motion: 0.3 * motion.q[1])
+    strict = replace(CRITERIA, least_votes=1.01)
+    found = diagnose(load_robot(), runs, bands=BANDS, catalogue=(Spring(),), criteria=strict)
+    (decision,) = (item for item in found.search.decisions if item.label == "spring of joint2")
+    assert decision.examination.p_value * found.search.tried < strict.family_error
+    for why, motion in (("chance", Spring.experiment), (f"{BY_NOISE} makes it", "move joint2 further and faster: ")):
+        search = replace(found.search, decisions=(replace(decision, why=why),))
+        (asked,) = (item for item in next_steps(replace(found, search=search)) if item.question.startswith("to judge"))
+        assert asked.motion.startswith(motion)

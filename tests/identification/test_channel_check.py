@@ -181,14 +181,19 @@ def test_two_faults_at_once(recordings: tuple[Recording, ...]) -> None:
     assert ("effort", ("joint1", "joint2"), True) in faults
 
 
-def test_diagnose_refuses_and_identify_says_it(recordings: tuple[Recording, ...]) -> None:
+def test_diagnose_refuses_and_identify_says_it(
+    recordings: tuple[Recording, ...], caplog: pytest.LogCaptureFixture
+) -> None:
     wrong = [turned(item, effort=(1,)) for item in recordings]
     robot = virtual_arm().robot
     with pytest.raises(RecordingError, match=r"negate effort_gain of joint2 in robot\.yaml") as caught:
         diagnose(robot, wrong)
     assert "\n" not in str(caught.value)
-    notes = identify(robot, wrong).notes
-    assert any("opposite sign" in note for note in notes)
+    with caplog.at_level("WARNING", logger="scara_ident"):
+        result = identify(robot, wrong)
+    assert [fault.joints for fault in result.channels] == [("joint2",)]
+    # Who calls from Python is told as of notes; where it is printed see `tests/report/test_doubts.py`.
+    assert str(result.channels[0]) in caplog.messages
 
 
 @pytest.mark.parametrize("signals", [("effort",), ("position",), ("effort", "position")])

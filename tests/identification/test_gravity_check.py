@@ -24,13 +24,16 @@ from tests.estimation.test_urdf_gravity import ARM
 DOWN, UP = np.array([0.0, 0.0, -9.81]), np.array([0.0, 0.0, 9.81])
 
 
-def made(folder: Path, true: np.ndarray, stated: np.ndarray, links=ARM) -> tuple[Robot, Recording]:
+def made(
+    folder: Path, true: np.ndarray, stated: np.ndarray, links=ARM, friction: float = 1.0
+) -> tuple[Robot, Recording]:
     """An arm under a gravity, and its description: bodies that lie elsewhere and weigh something else, under another."""
     arm = load_robot(write_urdf(folder / "true.urdf", links))
     arm.model.gravity.linear = true
     rng, time = np.random.default_rng(3), np.arange(2400) / 200.0
     q, v, a = sines(rng, time, arm.n)
-    run = recording(arm, "run_1", time, q, recorded_torque(arm, q, v, a, ((0.4, 0.3, 0.0, 0.0, 0.1),) * arm.n))
+    law = (0.4 * friction, 0.3 * friction, 0.0, 0.0, 0.1)
+    run = recording(arm, "run_1", time, q, recorded_torque(arm, q, v, a, (law,) * arm.n))
     other = [
         replace(link, mass=size * link.mass, com=(-0.1, 0.15, 0.05))
         for link, size in zip(links, (0.3, 4.0, 0.2), strict=False)

@@ -99,7 +99,8 @@ def test_the_line_that_is_told_mends_it(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match=line) as caught:
         diagnose(wrong, read_recordings(files, wrong), model="basic")
     assert "\n" not in str(caught.value)
-    assert any("counts from another zero" in note for note in identify(wrong, read_recordings(files, wrong)).notes)
+    channels = identify(wrong, read_recordings(files, wrong)).channels
+    assert any("counts from another zero" in str(fault) for fault in channels)
     right = load_robot(described(j2s6s200_joint_4=90.0))
     mended = read_recordings(files, right)
     assert not diagnose(right, mended, model="basic").effects

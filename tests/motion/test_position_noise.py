@@ -158,6 +158,24 @@ def test_an_encoder_too_coarse_for_its_band_is_named(bits: int, band: float, coa
         identify(load_robot(), [replace(item, position=step * np.round(SMOOTH / step))], bands=[band, band])
 
 
+def test_a_joint_that_hardly_moves_is_to_be_moved_and_the_other_to_have_a_finer_encoder():
+    """As coarse for its band: of an encoder of 17 bits a finer one was asked for, where the joint trembled by 34 of its steps."""
+    coarse, fine = 2.0 * np.pi / 2**10, 2.0 * np.pi / 2**17
+    little = 1e-3 * SMOOTH[1]
+    position = np.vstack([coarse * np.round(SMOOTH[0] / coarse), fine * np.round(little / fine)])
+    item = recording(load_robot(), "M_1", TIME, position, np.sin(3.0 * position))
+    said = coarse_positions(prepare([item], (50.0, 50.0)).recordings[0])
+    assert said is not None
+    first, second = said.split("; positions of ")
+    assert first.startswith(
+        f"positions of joint2 move by {np.ptp(position[1]):.2g} (rad or m) in all, in steps of {fine:.2g}, so little"
+    )
+    assert "move further and faster" in first
+    assert "finer" not in first
+    assert second.startswith("joint1 go in steps")
+    assert "finer encoder" in second
+
+
 @pytest.mark.parametrize(("swing", "share", "unresolved"), [(3e-3, 1.0, True), (3e-3, 0.4, False), (1e-5, 1.0, False)])
 def test_a_joint_that_shakes_beyond_the_rate_is_not_resolved(swing: float, share: float, unresolved: bool):
     # 72 Hz at 125 samples a second look like 53 Hz.

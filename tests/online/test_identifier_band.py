@@ -210,3 +210,38 @@ def test_a_change_is_seen_within_a_second_and_a_half_and_named(kind, joint):
     assert alarms and 0 < alarms[0].sample - part <= 1.5 * RATE
     assert (alarms[0].effect, alarms[0].joint) == (kind, joint)
     assert alarms[0].size > 0.0 and alarms[0].unit in ("1", "kg")
+
+
+def coarse(bits: int, band: float, seconds: float = 60.0, seed: int = 0) -> OnlineIdentifier:
+    """An arm behind encoders of so many bits."""
+    states, step = signals(seconds, seed), 2.0 * np.pi / 2**bits
+    return fed(np.round(states[0] / step) * step, torque(states, truth(), seed=seed), replace(SETTINGS, band=band))
+
+
+def test_a_band_too_wide_for_the_encoder_is_said_once_and_a_narrower_that_does(
+    caplog: pytest.LogCaptureFixture, tmp_path: Path
+):
+    """Twenty times the alarms that were asked for were raised in one, and only the documentation said so."""
+    online = coarse(13, 20.0)
+    # Shares change as more is known.
+    (note,), (_,) = caplog.messages, online.notes
+    assert note.startswith("in a band of 20 Hz the noise of positions makes ")
+    narrower = float(note.partition("; a band of ")[2].partition(" Hz")[0])
+    assert 2.0 < narrower < 20.0
+    # Not again, neither by going on nor after a restart.
+    online.save(tmp_path / "state.npz")
+    again = OnlineIdentifier.restore(tmp_path / "state.npz", model())
+    states = signals(10.0)
+    again.update_block(rounded(states[0]), None, None, torque(states, truth()))
+    assert again.notes and caplog.messages == [note]
+    assert coarse(13, narrower).notes == ()
+    assert caplog.messages == [note]
+
+
+@pytest.mark.parametrize(("bits", "band"), [(17, 10.0), (17, 20.0), (13, 5.0)])
+def test_of_a_band_that_goes_with_the_encoder_nothing_is_said(bits: int, band: float, caplog: pytest.LogCaptureFixture):
+    for seed in (1, 2, 3):
+        assert coarse(bits, band, seed=seed).notes == ()
+    assert caplog.messages == []
+    # Nor without a band, where nothing is filtered.
+    assert OnlineIdentifier(model(), NOISE).notes == ()

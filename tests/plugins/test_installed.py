@@ -133,3 +133,33 @@ def test_a_broken_package_harms_only_who_asks_for_it(tmp_path: Path):
     done = program("identify", run, "--method", "ols")
     note = "scara-ident: note: method 'ols' of the package broken is not used: the name is built in\n"
     assert (done.returncode, done.stderr) == (0, note)
+
+
+BROKEN = """
+import numpy as np
+from scara_ident.effects import Coefficient, Effect
+
+class Pole(Effect):
+    name = "pole"
+    summary = "pole"
+    coefficients = (Coefficient("size", "{torque}", "of a pole"),)
+
+    def signal_columns(self, signals, member):
+        return [1.0 / (0.0 * signals.motion.q[member.place])]
+"""
+
+
+def test_an_effect_whose_arithmetic_fails_is_an_error_of_a_line_where_asked_for_and_else_a_note(tmp_path: Path):
+    make_installed(tmp_path, "poles", "scara_ident.effects", {"pole": "poles:Pole"}, BROKEN)
+    runs = [str(tmp_path / f"{run.name}.parquet") for run in virtual_runs()]
+    for run, path in zip(virtual_runs(), runs, strict=True):
+        write_recording(run, Path(path))
+    program = program_beside(tmp_path)
+    said = "pole of joint1, joint2 cannot be tried: its columns are not finite on any recording; correct the effect"
+    done = program("diagnose", *runs, "--band", "11", "--effects", "spring,pole")
+    assert (done.returncode, done.stderr) == (1, f"scara-ident: effect {said} or do not ask for it\n")
+    done = program("diagnose", *runs, "--band", "11", "--json")
+    assert (done.returncode, done.stderr) == (0, "")
+    content = json.loads(done.stdout)
+    assert said in content["notes"]
+    assert "pole" not in {row["effect"] for row in content["candidates"]}

@@ -358,8 +358,9 @@ def diagnosis_report(path: Path, context: DiagnosisContext) -> None:
         f"{diagnosis.before.model.name} model; {several(len(diagnosis.training_after.data.recordings), 'recording')}, {len(diagnosis.validation_after.data.recordings)} held out; "
         f"{diagnosis.search.tried} candidates tried"
     )
-    verdict = _verdict(diagnosis, content["summary"])
-    warn = diagnosis.verdict in ("unexplained", "undecided")
+    first, others = content["doubts"], content["summary"][len(content["doubts"]) :]
+    verdict = (*first, *_verdict(diagnosis, others))
+    warn = bool(first) or diagnosis.verdict in ("unexplained", "undecided")
     title = f"Diagnosis of {diagnosis.robot.name}"
     Page(title, subtitle, verdict, found, warn, _picture(context)).write(path)
 

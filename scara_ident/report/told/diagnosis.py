@@ -27,7 +27,8 @@ def summary(diagnosis: Diagnosis) -> str:
     notes = [f"note: {note}" for note in diagnosis.notes]
     heading = f"{diagnosis.robot.name}: {diagnosis.verdict}"
     left = [f"predict leaves out {name}." for name in diagnosis.not_predicted]
-    return text_of(*notes, heading, *held["summary"], *tables(held), *left)
+    first, others = held["doubts"], held["summary"][len(held["doubts"]) :]
+    return text_of(*first, *notes, heading, *others, *tables(held), *left)
 
 
 def columns(diagnosis: Diagnosis) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from scara_ident.identification.identify import Identification
-from scara_ident.report.identification import identification_dict, sentences
+from scara_ident.report.identification import identification_dict, told
 from scara_ident.report.told import estimate
 from scara_ident.report.told.words import in_units, table, text_of
 
@@ -18,9 +18,10 @@ content = identification_dict
 
 
 def summary(identification: Identification) -> str:
-    """Return parameters, errors and bands as tables, and the result in sentences."""
+    """Return what questions the result, parameters, errors and bands as tables, and the result in sentences."""
     notes = [f"note: {note}" for note in identification.notes]
-    return text_of(*notes, *tables(identification), bands_said(identification), *sentences(identification))
+    first, others = told(identification)
+    return text_of(*first, *notes, *tables(identification), bands_said(identification), *others)
 
 
 def columns(identification: Identification) -> dict[str, Any]:
