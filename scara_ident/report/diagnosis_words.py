@@ -25,6 +25,8 @@ from scara_ident.robot.rotors import GUESS_FACTOR
 NEAR = 1.3
 # Two values differ from so many of their common standard deviations: 0.3 %.
 DIFFERENT_STDS = 3.0
+# An error is told to be worse from so many times on: less may be chance.
+WORSE = 1.2
 
 
 def sentences(diagnosis: Diagnosis) -> tuple[str, ...]:
@@ -67,19 +69,20 @@ def _others(diagnosis: Diagnosis) -> list[str]:
     if not old.data.recordings:
         kind, old, new = "training", diagnosis.training_before, diagnosis.training_after
     if diagnosis.effects:
-        changes = [
-            f"{joint} {a:.3g} to {b:.3g} {diagnosis.robot.torque_unit(j)}"
-            for j, (joint, a, b) in enumerate(
-                zip(
-                    diagnosis.robot.joints,
-                    rms_of(diagnosis.before.value, old),
-                    rms_of(diagnosis.after.value, new),
-                    strict=True,
-                )
-            )
-            if a is not None and b is not None
-        ]
+        pairs = zip(
+            diagnosis.robot.joints,
+            rms_of(diagnosis.before.value, old),
+            rms_of(diagnosis.after.value, new),
+            strict=True,
+        )
+        errors = [(joint, a, b) for joint, a, b in pairs if a is not None and b is not None]
+        units = {joint: diagnosis.robot.torque_unit(j) for j, joint in enumerate(diagnosis.robot.joints)}
+        changes = [f"{joint} {a:.3g} to {b:.3g} {units[joint]}" for joint, a, b in errors]
         found.append(f"Rms error on the {kind} recordings: {'; '.join(changes)}.")
+        worse = [f"{joint} ({b / a:.2g} times)" for joint, a, b in errors if b > WORSE * a > 0.0]
+        if worse:
+            instead = "there use the model without it, or fit further motions"
+            found.append(f"Worse with what was found than without: {', '.join(worse)}; {instead}.")
     biased = bias_said(diagnosis.after)
     if biased is not None:
         found.append(biased)
