@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, columns_at_hand
-from scara_ident.diagnosis.effect_parameters import physical_parameters
+from scara_ident.diagnosis.effect_parameters import physical_parameters, told_size
 from scara_ident.diagnosis.linearised import linearise
 from scara_ident.diagnosis.nonlinear_fit import LEAST_FALL, RISE, tune
 from scara_ident.diagnosis.part_of_recordings import on_all, on_part
@@ -71,14 +71,27 @@ def as_good(step: SelectionStep) -> Iterator[SelectionStep]:
     if len(places) > 1:
         own = _Fit(step, linearise(step).error)
         yield from (each.step for each in _rivals(own) if each.near(own) and _alike(step, each.step, places))
-        below = _below(step)
-        if below is not None and _others(step, below, places):
-            yield below
+    below = _below(step)
+    if below is not None and _others(step, below, places):
+        yield below
     for member in step.chosen[places[0]].effect.unfound(step.scene, step.chosen[places[0]].member):
         further = replace(step.chosen[places[0]], member=member)
         other = tune(replace(step, chosen=(*step.chosen, further)))
         if linearise(other).error < (1.0 - RISE) * linearise(step).error:
             yield other
+
+
+def quieter(step: SelectionStep) -> SelectionStep | None:
+    """Return the fit in the lower part of the band where what is told of effects that act together is to be told from there.
+
+    That is where it contradicts the step's, what lags has no noise of positions there, and every effect of the step is told; else None.
+    """
+    places = _together(step)
+    below = _below(step) if places else None
+    if below is None or noisy(below.observations.data, OF_LAG) or not _others(step, below, places):
+        return None
+    told = zip(below.chosen, physical_parameters(below).effects, strict=True)
+    return below if all(told_size(item.effect, own, step.criteria.least_final_size) for item, own in told) else None
 
 
 def _together(step: SelectionStep) -> list[int]:
@@ -183,12 +196,18 @@ def _columns_at(step: SelectionStep, bands: tuple[float, ...]) -> CandidateColum
 
 def _others(step: SelectionStep, other: SelectionStep, places: Sequence[int]) -> bool:
     """Whether any parameter of effects that act together differs by more than chance from that of another fit."""
-    here, there = (physical_parameters(each).effects for each in (step, other))
-    return any(
-        abs(there[place][name].value - one.value) > step.criteria.alike * np.hypot(one.std, there[place][name].std)
-        for place in places
-        for name, one in here[place].items()
-    )
+    there = physical_parameters(other).effects
+
+    def differ(*, of_noise: bool) -> bool:
+        here = physical_parameters(step, of_noise=of_noise).effects
+        return any(
+            abs(there[place][name].value - one.value) > step.criteria.alike * np.hypot(one.std, there[place][name].std)
+            for place in places
+            for name, one in here[place].items()
+        )
+
+    # What the noise of positions adds takes one more fit, and makes nothing differ that did not.
+    return differ(of_noise=False) and differ(of_noise=True)
 
 
 def widened(own: Mapping[str, Parameter], told: Mapping[str, Parameter]) -> dict[str, Parameter]:

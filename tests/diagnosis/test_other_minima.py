@@ -15,7 +15,7 @@ from scara_ident.diagnosis.effect_parameters import physical_parameters
 from scara_ident.diagnosis.linearised import linearise
 from scara_ident.diagnosis.nonlinear_fit import tune
 from scara_ident.diagnosis.other_laws import parameters_of_laws
-from scara_ident.diagnosis.other_minima import _below, as_good, lowest, widened
+from scara_ident.diagnosis.other_minima import _below, as_good, lowest, quieter, widened
 from scara_ident.diagnosis.selection_step import SelectionStep
 from scara_ident.effects import Member, Parameter
 from scara_ident.effects.elasticity import JointElasticity
@@ -146,6 +146,42 @@ def test_the_lower_part_of_the_band_ends_where_what_lags_has_no_noise(monkeypatc
     assert 0.1 < _below(step).observations.data.bands[0] < 5.0
     monkeypatch.setattr(module, "noisy", lambda data, derivatives=0: False)
     assert _below(step) is None
+
+
+@pytest.mark.slow
+def test_what_contradicts_itself_where_positions_have_no_noise_is_told_from_there(monkeypatch: pytest.MonkeyPatch):
+    """Three gears of 12, 15 and 6 kN m/rad were 10.5 +- 2, 14.3 +- 0.6 and 6.7 +- 0.4; below 5 Hz 12.0 +- 0.1, 15.0 +- 0.4 and 6.2 +- 0.2."""
+    chosen = [Candidate(FAMILY, Member(0, (2.8, 0.03))), Candidate(FAMILY, Member(1, (8.9, 0.03)))]
+    step = tune(step_beside(elastic_runs(900, 2400), chosen, bands=(13.0, 13.0)))
+    softer = replace(step, chosen=(step.chosen[0], step.chosen[1].at((6.0, 0.03))))
+    module = sys.modules[lowest.__module__]
+    monkeypatch.setattr(module, "_below", lambda _: step)
+    monkeypatch.setattr(module, "noisy", lambda *_: False)
+    assert quieter(softer) is step
+    # What says the same stays where it is, and so does all where that is noisy too or tells not all that was found.
+    assert quieter(step) is None
+    with monkeypatch.context() as context:
+        context.setattr(module, "noisy", lambda *_: True)
+        assert quieter(softer) is None
+    with monkeypatch.context() as context:
+        context.setattr(module, "told_size", lambda effect, own, stds: own["stiffness"].value > 1000.0)
+        assert quieter(softer) is None
+    monkeypatch.setattr(module, "_below", lambda _: None)
+    assert quieter(softer) is None
+
+
+def test_one_alone_is_compared_with_itself_where_positions_have_no_noise_as_several_are(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    step = step_beside(exact_runs(1, 1), [Candidate(FAMILY, Member(0, (9.0, 0.1)))])
+    below, module = replace(step), sys.modules[lowest.__module__]
+    monkeypatch.setattr(module, "_below", lambda _: below)
+    monkeypatch.setattr(module, "noisy", lambda *_: False)
+    monkeypatch.setattr(module, "told_size", lambda *_: True)
+    for differs in (True, False):
+        monkeypatch.setattr(module, "_others", lambda *_, differs=differs: differs)
+        assert (quieter(step) is below) == differs
+        assert any(each is below for each in as_good(step)) == differs
 
 
 @pytest.mark.slow
