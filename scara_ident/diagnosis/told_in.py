@@ -32,7 +32,7 @@ def told_in(found: Search, step: SelectionStep) -> Search:
     start = wls(uncorrected)
     first = replace(scene_of(model, start.value, uncorrected), armatures=found.first.armatures)
     step = tune(replace(step, weights=value_and_weights(observed(step), step.offsets)[1]))
-    judged = step.judge([item.candidate for item in found.decisions])
+    judged = step.judge([item.candidate for item in found.decisions], first)
     # What was refused for more than its tests stays so.
     decisions = tuple(
         now.refused(item.why) if now.accepted else now for item, now in zip(found.decisions, judged, strict=True)
