@@ -78,10 +78,10 @@ def select_model(task: SearchTask, observations: Observations, *, free: bool) ->
 
 
 def told_where_quiet(task: SearchTask, outcome: Outcome) -> Outcome:
-    """Return what a search leaves in the lower part of the band, where effects that act together contradict there what they are.
+    """Return what a search leaves, told from the lower part of the band where the noise of positions moves what was found.
 
-    The noise of positions then moves them, and all that was fitted with them, further than anybody can tell; below, it does
-    not. As it was where not all that was found is told there, or something else is left over.
+    Effects that act together tell so, see `quieter`, and all that was fitted with them moves too. As it was where something is left
+    over, or an effect does not stand there.
     """
     found, after = outcome.search, outcome.after
     if outcome.unexplained is not None:

@@ -71,9 +71,9 @@ def as_good(step: SelectionStep) -> Iterator[SelectionStep]:
     if len(places) > 1:
         own = _Fit(step, linearise(step).error)
         yield from (each.step for each in _rivals(own) if each.near(own) and _alike(step, each.step, places))
-    below = _below(step)
-    if below is not None and _others(step, below, places):
-        yield below
+        below = _below(step)
+        if below is not None and _others(step, below, places):
+            yield below
     for member in step.chosen[places[0]].effect.unfound(step.scene, step.chosen[places[0]].member):
         further = replace(step.chosen[places[0]], member=member)
         other = tune(replace(step, chosen=(*step.chosen, further)))
@@ -84,11 +84,12 @@ def as_good(step: SelectionStep) -> Iterator[SelectionStep]:
 def quieter(step: SelectionStep) -> SelectionStep | None:
     """Return the fit in the lower part of the band where what is told of effects that act together is to be told from there.
 
-    That is where it contradicts the step's, what lags has no noise of positions there, and every effect of the step is told; else None.
+    That is where the noise of positions moves the step's away from it, what lags has no such noise there, and every effect of the
+    step is told there; else None.
     """
     places = _together(step)
     below = _below(step) if places else None
-    if below is None or noisy(below.observations.data, OF_LAG) or not _others(step, below, places):
+    if below is None or noisy(below.observations.data, OF_LAG) or not _moved_by_noise(step, below, places):
         return None
     told = zip(below.chosen, physical_parameters(below).effects, strict=True)
     return below if all(told_size(item.effect, own, step.criteria.least_final_size) for item, own in told) else None
@@ -196,18 +197,42 @@ def _columns_at(step: SelectionStep, bands: tuple[float, ...]) -> CandidateColum
 
 def _others(step: SelectionStep, other: SelectionStep, places: Sequence[int]) -> bool:
     """Whether any parameter of effects that act together differs by more than chance from that of another fit."""
-    there = physical_parameters(other).effects
+    here, there = (physical_parameters(each).effects for each in (step, other))
+    return bool(_differing(here, there, places, step.criteria.alike))
 
-    def differ(*, of_noise: bool) -> bool:
-        here = physical_parameters(step, of_noise=of_noise).effects
-        return any(
-            abs(there[place][name].value - one.value) > step.criteria.alike * np.hypot(one.std, there[place][name].std)
-            for place in places
-            for name, one in here[place].items()
-        )
 
-    # What the noise of positions adds takes one more fit, and makes nothing differ that did not.
-    return differ(of_noise=False) and differ(of_noise=True)
+def _moved_by_noise(step: SelectionStep, below: SelectionStep, places: Sequence[int]) -> bool:
+    """Whether any of them differs by more than chance from that of a fit below the noise, which moves it away from there.
+
+    With the noise twice it moves by as much again (Cook and Stefanski, JASA 89, 1994). Without that it is no noise that tells them
+    apart: below a resonance little is seen of it, and what else a model lacks counts for more.
+    """
+    alike = step.criteria.alike
+    here, there = (physical_parameters(each, of_noise=False).effects for each in (step, below))
+    differing = _differing(here, there, places, alike)
+    if not differing:
+        return False
+    again = physical_parameters(tune(step.noisier), of_noise=False).effects
+    for place, name in differing:
+        own, moved = here[place][name], again[place][name].value - here[place][name].value
+        if abs(moved) > alike * own.std and moved * (own.value - there[place][name].value) > 0.0:
+            return True
+    return False
+
+
+def _differing(
+    here: Sequence[Mapping[str, Parameter]],
+    there: Sequence[Mapping[str, Parameter]],
+    places: Sequence[int],
+    stds: float,
+) -> list[tuple[int, str]]:
+    """Return places and names of the parameters that differ by more than so many standard deviations of both."""
+    return [
+        (place, name)
+        for place in places
+        for name, one in here[place].items()
+        if abs(there[place][name].value - one.value) > stds * np.hypot(one.std, there[place][name].std)
+    ]
 
 
 def widened(own: Mapping[str, Parameter], told: Mapping[str, Parameter]) -> dict[str, Parameter]:
