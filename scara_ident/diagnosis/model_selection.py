@@ -89,7 +89,7 @@ def told_where_quiet(task: SearchTask, outcome: Outcome) -> Outcome:
     below = quieter(replace(found.step, weights=after.weights, variation=after.offsets))
     if below is None:
         return outcome
-    task.progress("fitting below the noise of the positions")
+    task.progress("fitting below the noise of the positions", 1.0)
     moved = outcome_of(task, told_in(found, below))
     if moved.unexplained is not None or _unstable(moved, outcome.demoted):
         return outcome
