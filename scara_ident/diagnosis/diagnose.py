@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.confounding import confounders
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
-from scara_ident.diagnosis.effect_parameters import PhysicalParameters, RotorInertia
+from scara_ident.diagnosis.effect_parameters import PhysicalParameters, RotorInertia, physical_parameters
 from scara_ident.diagnosis.evidence import Evidence
 from scara_ident.diagnosis.found_effect import (
     FoundEffect,
@@ -22,14 +22,15 @@ from scara_ident.diagnosis.found_effect import (
 )
 from scara_ident.diagnosis.interval_events import not_explained
 from scara_ident.diagnosis.lack_of_fit import LackOfFit
-from scara_ident.diagnosis.model_selection import select_model
+from scara_ident.diagnosis.model_selection import select_model, told_where_quiet
 from scara_ident.diagnosis.other_laws import parameters_of_laws
 from scara_ident.diagnosis.outcome import Outcome, Unexplained
 from scara_ident.diagnosis.screening import Dependence
 from scara_ident.diagnosis.search import Search, SearchTask
+from scara_ident.diagnosis.selection_step import SelectionStep
 from scara_ident.diagnosis.standing_lines import standing_lines, tentative_lines
 from scara_ident.diagnosis.tentative import TentativeEffect, tentative_effects
-from scara_ident.diagnosis.validation import validated
+from scara_ident.diagnosis.validation import Validation, validated
 from scara_ident.diagnosis.verdict import Verdict, verdict_of, weighed_evidence
 from scara_ident.diagnosis.whole_estimate import with_whole_estimate
 from scara_ident.diagnosis.work import first, searching
@@ -48,6 +49,7 @@ from scara_ident.identification.identify import check_bands, check_held_out
 from scara_ident.identification.usable import check_rows, usable_in_bands, with_rows
 from scara_ident.manners import Saved
 from scara_ident.model.model import TorqueModel
+from scara_ident.motion.prepared import PreparedData
 from scara_ident.progress import Tell, Work, log_notes, silent
 from scara_ident.robot.robot import Robot
 from scara_ident.threads import one_blas_thread
@@ -55,6 +57,8 @@ from scara_ident.threads import one_blas_thread
 _LOG = logging.getLogger(__name__)
 # Dependences that are handed on: further ones are pairs that only repeat the first.
 NAMED_DEPENDENCES = 12
+# Said where effects are told in a lower band than they were found in.
+QUIETER = "all is told below {:.2g} Hz: up to {:.2g} Hz, where it was found, the noise of the positions moves it by more than chance"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -244,17 +248,19 @@ def diagnose(
     chosen = catalogue is not None and not set(CATALOGUE) <= set(catalogue)
     task = SearchTask(base, families, criteria, searching(work, band_given=given), chosen)
     outcome, events = _without_events(task, observations, free=not given)
+    told = outcome if given else told_where_quiet(task, outcome)
     work("comparing what was found with what else it could be", task.progress.stop)
-    found = outcome.search
-    step = replace(found.step, weights=outcome.after.weights)
-    whole = replace(found.whole(step), variation=outcome.after.offsets)
+    found = told.search
+    step, whole = replace(found.step, weights=told.after.weights), _whole(told)
     parameters = parameters_of_laws(whole) if whole.chosen else PhysicalParameters()
     groups = confounders(step, found.decisions, found.first, found.doubtful) if found.chosen else []
-    final = outcome if parameters.linear is None else with_whole_estimate(outcome, parameters.linear)
-    held_out, useless = with_rows(held_out.at(found.bands), needed=False)
-    held = validated(final, held_out)
-    # What was asked beside the model stays as it was asked.
-    outcome = replace(final, search=found)
+    final = told if parameters.linear is None else with_whole_estimate(told, parameters.linear)
+    rows, useless = with_rows(held_out.at(found.bands), needed=False)
+    held = validated(final, rows)
+    # What was asked beside the model stays as it was asked, and where.
+    quieter, final = told is not outcome, replace(final, search=found)
+    searched, seen = _where_searched(outcome, held_out) if quieter else (final, held)
+    outcome = final
     readings = direct_readings(found, families, criteria.rotor_inertia_std)
     effects = found_effects(found, groups, parameters, readings, held.gains)
     refused = (*outcome.demoted, *outcome.suspected)
@@ -262,15 +268,17 @@ def diagnose(
     notes += [note for note in (*useless, *held.notes) if note not in notes]
     notes += not_found(readings, effects)
     notes += [f"{item.label} is not counted: {item.why}" for item in refused]
+    if quieter:
+        notes.append(QUIETER.format(found.scene.band, searched.search.scene.band))
     notes += _remarks(outcome, parameters)
     notes += [event.sentence(robot) for event in events]
     log_notes(_LOG, notes)
     # Where something is known to be left over no more is to be said of it.
-    lines = (None,) * robot.n if outcome.unexplained is not None else standing_lines(outcome.residuals, criteria)
-    shown = weighed_evidence(outcome, held, effects, lines, criteria)
+    lines = (None,) * robot.n if outcome.unexplained is not None else standing_lines(searched.residuals, criteria)
+    shown = weighed_evidence(searched, seen, effects, lines, criteria)
     believed = {(item.effect, item.joint) for item in effects}
     tentative = tentative_effects(found, refused, believed)
-    told = believed | {(item.effect, item.joint) for item in tentative}
+    named = believed | {(item.effect, item.joint) for item in tentative}
     # A result is held for longer than what only saved time.
     found.step.lean()
     return Diagnosis(
@@ -285,7 +293,7 @@ def diagnose(
         outcome.fit_before,
         outcome.fit_after,
         tuple(effects),
-        (*tentative, *tentative_lines(lines, found, families, told)),
+        (*tentative, *tentative_lines(lines, searched.search, families, named)),
         shown,
         aliases(base),
         outcome.unexplained,
@@ -295,6 +303,24 @@ def diagnose(
         events,
         given,
     )
+
+
+def _whole(outcome: Outcome) -> SelectionStep:
+    """Return the step that all parameters of an outcome are told by."""
+    found, after = outcome.search, outcome.after
+    return replace(found.whole(replace(found.step, weights=after.weights)), variation=after.offsets)
+
+
+def _where_searched(outcome: Outcome, held_out: PreparedData) -> tuple[Outcome, Validation]:
+    """Return an outcome that is told in other bands at the whole estimate in its own, and what recordings held out say of that.
+
+    Whether what is left is noise is asked where most of it is seen, by what leaves the least there.
+    """
+    linear = physical_parameters(_whole(outcome)).linear
+    assert linear is not None
+    final = with_whole_estimate(outcome, linear)
+    held = validated(final, with_rows(held_out.at(outcome.search.bands), needed=False)[0])
+    return replace(final, search=outcome.search), held
 
 
 def _without_events(task: SearchTask, observations: Observations, *, free: bool) -> tuple[Outcome, tuple[Event, ...]]:

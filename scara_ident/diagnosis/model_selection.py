@@ -13,10 +13,12 @@ from scara_ident.diagnosis.candidates import Candidate, CandidateColumns
 from scara_ident.diagnosis.choice import fitted_beside, more_than_chance
 from scara_ident.diagnosis.criteria import SelectionCriteria
 from scara_ident.diagnosis.noise_check import noise_objection
+from scara_ident.diagnosis.other_minima import quieter
 from scara_ident.diagnosis.outcome import Outcome, outcome_of
 from scara_ident.diagnosis.proxies import proxies
 from scara_ident.diagnosis.search import Search, SearchTask, in_place_of, scene_of, search, search_again
 from scara_ident.diagnosis.selection_step import SelectionStep
+from scara_ident.diagnosis.told_in import told_in
 from scara_ident.diagnosis.work import first, next_of
 from scara_ident.estimation import wls
 from scara_ident.estimation.bands import HIGHEST_BAND, choose_bands
@@ -75,13 +77,34 @@ def select_model(task: SearchTask, observations: Observations, *, free: bool) ->
     return replace(back, demoted=(*outcome.demoted, *back.demoted))
 
 
+def told_where_quiet(task: SearchTask, outcome: Outcome) -> Outcome:
+    """Return what a search leaves, told from the lower part of the band where the noise of positions moves what was found.
+
+    Effects that act together tell so, see `quieter`, and all that was fitted with them moves too. As it was where something is left
+    over, or an effect does not stand there.
+    """
+    found, after = outcome.search, outcome.after
+    if outcome.unexplained is not None:
+        return outcome
+    below = quieter(replace(found.step, weights=after.weights, variation=after.offsets))
+    if below is None:
+        return outcome
+    task.progress("fitting below the noise of the positions", 1.0)
+    moved = outcome_of(task, told_in(found, below))
+    if moved.unexplained is not None or _unstable(moved, outcome.demoted):
+        return outcome
+    return replace(moved, demoted=outcome.demoted, suspected=outcome.suspected)
+
+
 def _promised_band(found: Search, criteria: SelectionCriteria) -> float:
     """Return the band that would tell effects that are not in the model and may be there, Hz; 0 where there are none."""
-    chosen = _labels(found)
+    chosen, left = _labels(found), float(np.sum(found.step.model.squares))
     promising = [
         item
         for item in found.decisions
         if item.label not in chosen
+        # A fit with all else may have ended where it gains much beside others that it spoiled.
+        and float(np.sum(item.examination.left)) < left
         and item.candidate.effect.band(item.candidate.member) > 0.0
         and more_than_chance(item, found.tried, criteria)
         # A grid point loses the rest.

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, columns_at_hand
-from scara_ident.diagnosis.effect_parameters import physical_parameters
+from scara_ident.diagnosis.effect_parameters import physical_parameters, told_size
 from scara_ident.diagnosis.linearised import linearise
 from scara_ident.diagnosis.nonlinear_fit import LEAST_FALL, RISE, tune
 from scara_ident.diagnosis.part_of_recordings import on_all, on_part
@@ -79,6 +79,20 @@ def as_good(step: SelectionStep) -> Iterator[SelectionStep]:
         other = tune(replace(step, chosen=(*step.chosen, further)))
         if linearise(other).error < (1.0 - RISE) * linearise(step).error:
             yield other
+
+
+def quieter(step: SelectionStep) -> SelectionStep | None:
+    """Return the fit in the lower part of the band where what is told of effects that act together is to be told from there.
+
+    That is where the noise of positions moves the step's away from it, what lags has no such noise there, and every effect of the
+    step is told there; else None.
+    """
+    places = _together(step)
+    below = _below(step) if places else None
+    if below is None or noisy(below.observations.data, OF_LAG) or not _moved_by_noise(step, below, places):
+        return None
+    told = zip(below.chosen, physical_parameters(below).effects, strict=True)
+    return below if all(told_size(item.effect, own, step.criteria.least_final_size) for item, own in told) else None
 
 
 def _together(step: SelectionStep) -> list[int]:
@@ -184,11 +198,41 @@ def _columns_at(step: SelectionStep, bands: tuple[float, ...]) -> CandidateColum
 def _others(step: SelectionStep, other: SelectionStep, places: Sequence[int]) -> bool:
     """Whether any parameter of effects that act together differs by more than chance from that of another fit."""
     here, there = (physical_parameters(each).effects for each in (step, other))
-    return any(
-        abs(there[place][name].value - one.value) > step.criteria.alike * np.hypot(one.std, there[place][name].std)
+    return bool(_differing(here, there, places, step.criteria.alike))
+
+
+def _moved_by_noise(step: SelectionStep, below: SelectionStep, places: Sequence[int]) -> bool:
+    """Whether any of them differs by more than chance from that of a fit below the noise, which moves it away from there.
+
+    With the noise twice it moves by as much again (Cook and Stefanski, JASA 89, 1994). Without that it is no noise that tells them
+    apart: below a resonance little is seen of it, and what else a model lacks counts for more.
+    """
+    alike = step.criteria.alike
+    here, there = (physical_parameters(each, of_noise=False).effects for each in (step, below))
+    differing = _differing(here, there, places, alike)
+    if not differing:
+        return False
+    again = physical_parameters(tune(step.noisier), of_noise=False).effects
+    for place, name in differing:
+        own, moved = here[place][name], again[place][name].value - here[place][name].value
+        if abs(moved) > alike * own.std and moved * (own.value - there[place][name].value) > 0.0:
+            return True
+    return False
+
+
+def _differing(
+    here: Sequence[Mapping[str, Parameter]],
+    there: Sequence[Mapping[str, Parameter]],
+    places: Sequence[int],
+    stds: float,
+) -> list[tuple[int, str]]:
+    """Return places and names of the parameters that differ by more than so many standard deviations of both."""
+    return [
+        (place, name)
         for place in places
         for name, one in here[place].items()
-    )
+        if abs(there[place][name].value - one.value) > stds * np.hypot(one.std, there[place][name].std)
+    ]
 
 
 def widened(own: Mapping[str, Parameter], told: Mapping[str, Parameter]) -> dict[str, Parameter]:

@@ -30,8 +30,8 @@ DAMPING = 0.2
 # Damping ratios that the fit may reach: above it does not swing. Those of gears are told with the motor free, whose swinging is
 # faster: behind a motor that is held the ratio is smaller by the root of the rotor's share of both inertias.
 LOWEST_DAMPING, HIGHEST_DAMPING = 0.01, 0.7
-# Of the highest, at which a fit has gone as far as it may.
-ALL_BUT_DAMPED = 0.999
+# Of the highest damping ratio and frequency, at which a fit has gone as far as it may.
+AS_FAR_AS_MAY_BE = 0.999
 # A resonance is told from a softer gear by what is above it: the band reaches so many times its frequency.
 BOTH_SIDES = 1.5
 # Links that share less of their inertia hardly swing together.
@@ -106,8 +106,11 @@ class JointElasticity(BehindGear):
         return ((float(frequency), DAMPING) for frequency in np.geomspace(LOWEST_FREQUENCY, highest, count + 1))
 
     def band(self, member: Member) -> float:
-        """Return a band that holds both sides of the resonance."""
-        return BOTH_SIDES * member.nonlinear[0]
+        """Return a band that holds both sides of the resonance; 0 where a fit ended without one."""
+        frequency, ratio = member.nonlinear
+        # What does not swing, or faster than any gear, only lags: where its frequency ended tells of no resonance there.
+        seen = not _is_damped(ratio) and frequency < AS_FAR_AS_MAY_BE * HIGHEST_FREQUENCY
+        return BOTH_SIDES * frequency if seen else 0.0
 
     def words(self, scene: Scene, member: Member) -> dict[str, Any]:
         """Add the unit of the compliance, at the joint."""
@@ -182,7 +185,7 @@ class JointElasticity(BehindGear):
         if wrong is not None:
             return wrong
         frequency, ratio = member.nonlinear
-        if frequency < scene.band and ratio >= ALL_BUT_DAMPED * HIGHEST_DAMPING:
+        if frequency < scene.band and _is_damped(ratio):
             return f"within the band no resonance is seen at {frequency:.2g} Hz: what is damped so lags as a delay does"
         usual = usual_link_inertia(scene, member.place)
         least = value[0] - DOUBT_STDS * std[0]
@@ -221,6 +224,11 @@ class JointElasticity(BehindGear):
     def description(self, scene: Scene, member: Member) -> str:
         """Say what else it may be on the first joint."""
         return self.summary + (", or a base that yields about the same axis" if member.joint == 0 else "")
+
+
+def _is_damped(ratio: float) -> bool:
+    """Whether a damping ratio is as high as a fit may reach: what is damped so does not swing."""
+    return ratio >= AS_FAR_AS_MAY_BE * HIGHEST_DAMPING
 
 
 class Backlash(BehindGear):

@@ -15,7 +15,7 @@ from scara_ident.diagnosis.effect_parameters import physical_parameters
 from scara_ident.diagnosis.linearised import linearise
 from scara_ident.diagnosis.nonlinear_fit import tune
 from scara_ident.diagnosis.other_laws import parameters_of_laws
-from scara_ident.diagnosis.other_minima import _below, as_good, lowest, widened
+from scara_ident.diagnosis.other_minima import _below, as_good, lowest, quieter, widened
 from scara_ident.diagnosis.selection_step import SelectionStep
 from scara_ident.effects import Member, Parameter
 from scara_ident.effects.elasticity import JointElasticity
@@ -146,6 +146,38 @@ def test_the_lower_part_of_the_band_ends_where_what_lags_has_no_noise(monkeypatc
     assert 0.1 < _below(step).observations.data.bands[0] < 5.0
     monkeypatch.setattr(module, "noisy", lambda data, derivatives=0: False)
     assert _below(step) is None
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_what_noise_moves_is_told_from_where_there_is_none(count: int, monkeypatch: pytest.MonkeyPatch):
+    """Three gears of 12, 15 and 6 kN m/rad were 10.5 +- 2, 14.3 +- 0.6 and 6.7 +- 0.4; below 5 Hz 12.0 +- 0.1, 15.0 +- 0.4 and 6.2 +- 0.2.
+
+    One of 6679 was 6690 +- 46 in 13 Hz and 6159 +- 71 below 5 Hz, which no noise had to do with.
+    """
+    chosen = [Candidate(FAMILY, Member(j, (9.0 - j, 0.1))) for j in range(count)]
+    step = step_beside(exact_runs(1, 1), chosen)
+    below, module = replace(step), sys.modules[lowest.__module__]
+    values = {id(step): (10.7, 0.1), id(below): (12.0, 0.2), id(step.noisier): (10.2, 0.1)}
+
+    def parameters(each: SelectionStep, **_: bool) -> SimpleNamespace:
+        own = {"stiffness": Parameter(*values[id(each)], "kN m/rad")}
+        return SimpleNamespace(effects=tuple(dict(own) for _ in each.chosen))
+
+    monkeypatch.setattr(module, "physical_parameters", parameters)
+    monkeypatch.setattr(module, "tune", lambda each: each)
+    monkeypatch.setattr(module, "noisy", lambda *_: False)
+    monkeypatch.setattr(module, "told_size", lambda *_: True)
+    monkeypatch.setattr(module, "_below", lambda _: below)
+    assert quieter(step) is below
+    # Not where that is noisy too, or tells not all that was found, nor where there is none.
+    for name, instead in (("noisy", True), ("told_size", False), ("_below", None)):
+        with monkeypatch.context() as context:
+            context.setattr(module, name, lambda *_, instead=instead: instead)
+            assert quieter(step) is None
+    # Nor where noise moves it by no more than chance, or towards what is told below; nor where both are the same.
+    for noisier, there in (((10.6, 0.1), (12.0, 0.2)), ((11.2, 0.1), (12.0, 0.2)), ((10.2, 0.1), (11.0, 0.2))):
+        values[id(step.noisier)], values[id(below)] = noisier, there
+        assert quieter(step) is None
 
 
 @pytest.mark.slow

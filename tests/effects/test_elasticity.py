@@ -107,6 +107,14 @@ def test_what_no_gear_can_have_is_refused():
     assert "rattle" in str(Backlash().inadmissible(scene, Member(0, (1e-3,)), np.array([0.2]), std))
 
 
+@pytest.mark.parametrize(
+    ("frequency", "ratio", "band"), [(20.0, 0.2, 30.0), (20.0, 0.01, 30.0), (103.2, 0.7, 0.0), (200.0, 0.2, 0.0)]
+)
+def test_what_has_no_resonance_asks_for_no_band(frequency: float, ratio: float, band: float):
+    """A second gear that does not swing, of 135 Hz by the end of its fit, had led from 21 to 100 Hz, where nothing was told of it."""
+    assert JointElasticity().band(Member(0, (frequency, ratio))) == pytest.approx(band)
+
+
 def test_columns_of_members_in_the_model_add_up_and_that_of_another_is_what_it_changes_beside_them():
     family, scene = JointElasticity(), scene_of(load_robot())
     item = moving(scene.robot, 3.0)
