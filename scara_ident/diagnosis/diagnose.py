@@ -258,9 +258,8 @@ def diagnose(
     rows, useless = with_rows(held_out.at(found.bands), needed=False)
     held = validated(final, rows)
     # What was asked beside the model stays as it was asked, and where.
-    quieter, final = told is not outcome, replace(final, search=found)
-    searched, seen = _where_searched(outcome, held_out) if quieter else (final, held)
-    outcome = final
+    final = replace(final, search=found)
+    searched, seen = (final, held) if told is outcome else _where_searched(outcome, held_out)
     readings = direct_readings(found, families, criteria.rotor_inertia_std)
     effects = found_effects(found, groups, parameters, readings, held.gains)
     refused = (*outcome.demoted, *outcome.suspected)
@@ -268,13 +267,13 @@ def diagnose(
     notes += [note for note in (*useless, *held.notes) if note not in notes]
     notes += not_found(readings, effects)
     notes += [f"{item.label} is not counted: {item.why}" for item in refused]
-    if quieter:
+    if told is not outcome:
         notes.append(QUIETER.format(found.scene.band, searched.search.scene.band))
-    notes += _remarks(outcome, parameters)
+    notes += _remarks(final, parameters)
     notes += [event.sentence(robot) for event in events]
     log_notes(_LOG, notes)
     # Where something is known to be left over no more is to be said of it.
-    lines = (None,) * robot.n if outcome.unexplained is not None else standing_lines(searched.residuals, criteria)
+    lines = (None,) * robot.n if final.unexplained is not None else standing_lines(searched.residuals, criteria)
     shown = weighed_evidence(searched, seen, effects, lines, criteria)
     believed = {(item.effect, item.joint) for item in effects}
     tentative = tentative_effects(found, refused, believed)
@@ -282,22 +281,22 @@ def diagnose(
     # A result is held for longer than what only saved time.
     found.step.lean()
     return Diagnosis(
-        verdict_of(outcome, effects, shown),
+        verdict_of(final, effects, shown),
         found,
         found.start,
-        outcome.after,
+        final.after,
         found.uncorrected,
-        outcome.training,
+        final.training,
         held.before,
         held.after,
-        outcome.fit_before,
-        outcome.fit_after,
+        final.fit_before,
+        final.fit_after,
         tuple(effects),
         (*tentative, *tentative_lines(lines, searched.search, families, named)),
         shown,
         aliases(base),
-        outcome.unexplained,
-        outcome.dependences[:NAMED_DEPENDENCES],
+        final.unexplained,
+        final.dependences[:NAMED_DEPENDENCES],
         tuple(notes),
         parameters.rotors,
         events,
