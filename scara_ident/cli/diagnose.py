@@ -69,6 +69,7 @@ def diagnose(
                 from scara_ident.files import write_json, write_text
                 from scara_ident.report.diagnosis import diagnosis_dict
                 from scara_ident.report.diagnosis_markdown import diagnosis_markdown
+                from scara_ident.report.doubts import parted
                 from scara_ident.report.html.diagnosis import diagnosis_report
                 from scara_ident.report.html.page import page_template
                 from scara_ident.report.pictures import remove_stale
@@ -95,11 +96,11 @@ def diagnose(
         console = result_console(content, json)
         if verbose:
             show_recordings(console, (*training, *held_out))
-        first, others = content["doubts"], content["summary"][len(content["doubts"]) :]
+        first, rest = parted(content)
         console.say(first)
         console.note([*useless, *more, *result.notes])
         console.print(f"{arm.name}: {result.verdict}", style="bold")
-        console.say(others)
+        console.say(rest)
         for each in tables(content, all_candidates=verbose):
             console.print(each)
         if output is not None:

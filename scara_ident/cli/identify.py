@@ -44,6 +44,7 @@ def identify(
             from scara_ident.estimation.consistent.options import ConsistentOptions
             from scara_ident.files import write_json, write_text
             from scara_ident.identification.identify import identify as run
+            from scara_ident.report.doubts import parted
             from scara_ident.report.identification import identification_dict
             from scara_ident.report.told.identification import bands_said, tables
 
@@ -62,7 +63,7 @@ def identify(
     console = result_console(content, json)
     if verbose:
         show_recordings(console, (*training, *held_out))
-    first, others = content["doubts"], content["summary"][len(content["doubts"]) :]
+    first, others = parted(content)
     console.say(first)
     console.note([*useless, *more, *result.notes])
     for each in tables(result):

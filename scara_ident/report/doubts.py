@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from scara_ident.estimation import Estimate
 from scara_ident.estimation.observations import Observations
@@ -36,3 +37,9 @@ def doubts(
     gravity = gravity_said(base)
     turned = turned_bodies(estimate, observations)
     return (*([] if gravity is None else [gravity]), *([scale] if turned else []))
+
+
+def parted(content: Mapping[str, Any]) -> tuple[list[str], list[str]]:
+    """Return the sentences of a result, as its JSON has them, that question it, and all others."""
+    count = len(content["doubts"])
+    return content["summary"][:count], content["summary"][count:]

@@ -12,7 +12,7 @@ from scara_ident.estimation.urdf_weight import told_scale, turned_bodies
 from scara_ident.identification.identify import Identification, identify
 from scara_ident.report.diagnosis import diagnosis_dict
 from scara_ident.report.diagnosis_markdown import diagnosis_markdown
-from scara_ident.report.doubts import doubts
+from scara_ident.report.doubts import doubts, parted
 from scara_ident.report.html.diagnosis import DiagnosisContext, diagnosis_report
 from scara_ident.report.html.identification import IdentificationContext, identification_report
 from scara_ident.report.identification import identification_dict, told
@@ -44,8 +44,8 @@ def test_gravity_that_points_elsewhere_stands_before_the_parameters(hanging: Ide
     content = identification_dict(hanging)
     (doubt,) = content["doubts"]
     assert doubt.startswith(GRAVITY)
-    assert content["summary"][0] == doubt
     assert content["summary"].count(doubt) == 1
+    assert parted(content) == ([doubt], content["summary"][1:])
     # Printed before the notes, some of which every result has.
     noted = replace(hanging, notes=("what every result has",))
     assert in_order(noted.summary(), GRAVITY, "note: ", "meaning", "No recording tells a scale")

@@ -15,6 +15,7 @@ from scara_ident.diagnosis.lack_of_fit import LackOfFit
 from scara_ident.diagnosis.next_steps import next_steps
 from scara_ident.manners import several
 from scara_ident.report.diagnosis import diagnosis_dict, intervals
+from scara_ident.report.doubts import parted
 from scara_ident.report.html.blocks import (
     Block,
     Cell,
@@ -358,7 +359,7 @@ def diagnosis_report(path: Path, context: DiagnosisContext) -> None:
         f"{diagnosis.before.model.name} model; {several(len(diagnosis.training_after.data.recordings), 'recording')}, {len(diagnosis.validation_after.data.recordings)} held out; "
         f"{diagnosis.search.tried} candidates tried"
     )
-    first, others = content["doubts"], content["summary"][len(content["doubts"]) :]
+    first, others = parted(content)
     verdict = (*first, *_verdict(diagnosis, others))
     warn = bool(first) or diagnosis.verdict in ("unexplained", "undecided")
     title = f"Diagnosis of {diagnosis.robot.name}"

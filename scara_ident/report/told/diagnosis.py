@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from scara_ident.diagnosis.diagnose import Diagnosis
 from scara_ident.manners import several
 from scara_ident.report.diagnosis import beyond_chance, diagnosis_dict
+from scara_ident.report.doubts import parted
 from scara_ident.report.left_out import left_out_words
 from scara_ident.report.told.words import in_units, table, text_of
 
@@ -27,7 +28,7 @@ def summary(diagnosis: Diagnosis) -> str:
     notes = [f"note: {note}" for note in diagnosis.notes]
     heading = f"{diagnosis.robot.name}: {diagnosis.verdict}"
     left = [f"predict leaves out {name}." for name in diagnosis.not_predicted]
-    first, others = held["doubts"], held["summary"][len(held["doubts"]) :]
+    first, others = parted(held)
     return text_of(*first, *notes, heading, *others, *tables(held), *left)
 
 
