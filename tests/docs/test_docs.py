@@ -271,11 +271,22 @@ def test_what_the_readme_says_of_the_diagnosis_adds_up_from_its_page() -> None:
     page = (DOCS / "accuracy.md").read_text(encoding="utf-8")
     table = page[page.index("Added up, ") :].split("\n\n")[1].splitlines()[2:]
     rows = {line.split("|")[1].strip(): [int(n) for n in re.findall(r"\d+", line.split("|", 2)[2])] for line in table}
-    first, *further, total, alone = rows.values()
     # Sets, those with a false effect, right, of, with nothing missing, of these with a false effect.
+    first, *further, total, alone = rows.values()
     assert [sum(row[k] for row in further) for k in range(6)] == total[:6]
-    counted = sum(row[4] for row in further if len(row) == 7)
-    assert total[6:] == [sum(row[6] for row in further if len(row) == 7), counted]
+    assert total[6:] == [
+        sum(row[6] for row in further if len(row) == 7),
+        sum(row[4] for row in further if len(row) == 7),
+    ]
+    # Of later programs only the first four.
+    later = [
+        [int(n) for n in found]
+        for found in re.findall(r"^\| (\d+)\b.* \| (\d+) \| (\d+) \| (\d+) of (\d+) \|$", page, re.MULTILINE)
+    ]
+    nine, last = (
+        [sum(column) for column in zip(*(row[1:] for row in later if row[0] // 1000 == start), strict=True)]
+        for start in (7, 9)
+    )
     # Of one effect above the diagnosis' own limit, and above both; of two and three above both.
     own, both, more = (
         [sum(int(n) for n in found) for found in zip(*re.findall(r"(\d+) of (\d+)", row), strict=True)]
@@ -287,12 +298,16 @@ def test_what_the_readme_says_of_the_diagnosis_adds_up_from_its_page() -> None:
     assert first[2:4] == own
     readme = " ".join(README.read_text(encoding="utf-8").split())
     for said in (
-        f"a believed effect that is not there in {first[1]} of {first[0]} sets",
-        f"in {own[0]} of {own[1]} sets with one,",
-        f"same sets too in {both[0]} of {both[1]}; of two or three effects, each above both, all in {more[0]} of {more[1]}",
-        f"In {total[0]} sets of further seeds",
-        f"a false effect in {total[1]}, and {total[2]} of {total[3]} above",
-        f"of {total[4] + alone[0]} further sets",
-        f"of the {counted + alone[2]} for which it was counted none",
+        *(
+            f"| {sets} | {arms} | {false} | {right} of {of} |"
+            for arms, (sets, false, right, of) in (
+                ("SCARA03, UR5, Panda (3711, 3621, 3701)", first[:4]),
+                ("SCARA03, UR5, Panda (3801 to 4092)", total[:4]),
+                ("nine, six of them new to it (7101 to 7512)", nine),
+                ("SCARA03, UR5 (9901 to 9904)", last),
+            )
+        ),
+        f"| {alone[0]} | SCARA03, UR5, Panda, nothing missing (3721 to 3723) | {alone[1]} | |",
+        f"same sets too {both[0]} of {both[1]}; of two or three effects, each above both, all in {more[0]} of {more[1]};",
     ):
         assert said in readme, said
