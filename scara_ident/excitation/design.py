@@ -18,7 +18,7 @@ from scara_ident.excitation.criteria import Criterion, LogDet
 from scara_ident.excitation.curves import ExcitationTrajectory, Family, make_basis
 from scara_ident.excitation.judge import motion_of
 from scara_ident.excitation.limits import Limits, limits_of, nominal_parameters, resting_posture, without_coulomb
-from scara_ident.excitation.problem import NARROWEST, Task
+from scara_ident.excitation.problem import NARROWEST, Task, speed_within
 from scara_ident.excitation.promise import FINE_RATE, Told, told
 from scara_ident.excitation.search import Effort, Progress, search
 from scara_ident.excitation.sensitivity import SmoothModel
@@ -238,15 +238,16 @@ def design_excitation(
     counted = tuple(max(2, round(samples * each / longest)) for each in durations)
     for orders, size in zip(chosen, counted, strict=True):
         check_size(orders, robot.n, trajectories, size)
+    bases = tuple(
+        make_basis(each, orders, family, fixed_start=start is not None)
+        for each, orders in zip(durations, chosen, strict=True)
+    )
     task = Task(
-        smooth=SmoothModel(model, NARROWEST * limits.velocity),
+        smooth=SmoothModel(model, NARROWEST * speed_within(limits, bases)),
         limits=left,
         nominal=smooth,
         criterion=LogDet() if criterion is None else criterion,
-        bases=tuple(
-            make_basis(each, orders, family, fixed_start=start is not None)
-            for each, orders in zip(durations, chosen, strict=True)
-        ),
+        bases=bases,
         posture=resting_posture(model, left, smooth, start=start, seed=effort.seed),
         samples=counted,
         weights=weights,

@@ -29,6 +29,8 @@ POSTURES = 4000
 SHARE, CLEARANCE = 0.8, 0.01
 # A posture at rest must leave this share of every limit to move in.
 ROOM = 0.02
+# A joint of a smaller range, which is that of a lock, shows nothing.
+LEAST_RANGE = {"rad": 1e-3, "m": 1e-5}
 
 
 class InfeasibleLimits(ScaraIdentError):
@@ -160,10 +162,10 @@ def limits_of(
                 f"{robot.urdf}: joint {name!r} has no position limits; give <limit lower= upper=> in the URDF, or a "
                 f"range for {name} in {unit} (--range {name}=LOWER..UPPER)"
             )
-        if not lower[joint] < upper[joint]:
+        if not upper[joint] - lower[joint] > LEAST_RANGE[unit]:
             raise RobotError(
                 f"{robot.urdf}: joint {name!r} cannot move: its range is {lower[joint]:g}..{upper[joint]:g} {unit}; "
-                "correct the URDF, give a range, or lock the joint"
+                "correct the URDF, give a wider range, or lock the joint"
             )
         if not np.isfinite(velocity[joint]):
             raise RobotError(

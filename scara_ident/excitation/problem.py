@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -18,7 +19,7 @@ from scara_ident.excitation.slopes import Slopes
 from scara_ident.excitation.tool import ToolMotion, tool_motion
 from scara_ident.motion.motion import Motion
 
-# Coulomb friction turns within this share of a joint's velocity limit, at the start and at the end of a search.
+# Coulomb friction turns within this share of the speed that a joint can have, at the start and at the end of a search.
 WIDEST, NARROWEST = 0.05, 0.005
 
 
@@ -65,6 +66,21 @@ class Task:
     def trajectories(self) -> int:
         """How many, k, are designed together."""
         return len(self.bases)
+
+    @cached_property
+    def speed(self) -> Array:
+        """Speed that each joint can have, shape (n,)."""
+        return speed_within(self.limits, self.bases)
+
+
+def speed_within(limits: Limits, bases: Sequence[Basis]) -> Array:
+    """Return the speed that each joint can have, shape (n,): its limit, or what its range leaves a motion of the bases' frequencies.
+
+    What has no frequency above f and stays within a of its centre is no faster than 2 pi f a (Bernstein's inequality). Many a
+    URDF states a limit that no motion comes near.
+    """
+    highest = max(basis.bandwidth for basis in bases)
+    return np.minimum(limits.velocity, np.pi * highest * (limits.upper - limits.lower))
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +134,7 @@ class Problem:
         """Return the problem as it is to be solved first (share 0) or last (share 1)."""
         task = self.task
         width = WIDEST * (NARROWEST / WIDEST) ** share
-        smooth = replace(task.smooth, width=width * task.limits.velocity)
+        smooth = replace(task.smooth, width=width * task.speed)
         return replace(self, task=replace(task, smooth=smooth, criterion=task.criterion.sharpened(share)))
 
     @cached_property

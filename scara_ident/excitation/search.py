@@ -36,7 +36,7 @@ CORRECTION = Schedule(first=0.05, last=1e-2, tolerance=1e-2, steps=50, sharpness
 # Size of changes of a good motion, as shares of it.
 CHANGES = (0.03, 0.1, 0.2)
 ELITE = 3
-# Random starts have this share of the highest frequency as their bandwidth, and this share of the velocity limits.
+# Random starts have this share of the highest frequency as their bandwidth, and this share of the speed that a joint can have.
 SLOW, GENTLE = 0.25, 0.5
 CORRECTIONS = 5
 # How much a motion shrinks that is beyond a limit, of the share beyond it; and at least and at most.
@@ -172,7 +172,7 @@ def from_random(problem: Problem, seed: int, index: int, parent: Array | None = 
 
 
 def _random_motion(task: Task, random: np.random.Generator) -> Array:
-    """Draw a slow motion of about half the velocity limits."""
+    """Draw a slow motion of about half the speed that each joint can have."""
     x = np.zeros(task.shape)
     for own, basis in zip(x, task.bases, strict=True):
         time = basis.duration * (np.arange(8 * basis.size) + 0.5) / (8 * basis.size)
@@ -181,7 +181,7 @@ def _random_motion(task: Task, random: np.random.Generator) -> Array:
         phases = 2.0 * np.pi / basis.duration * np.outer(orders, time)
         sizes = random.normal(size=(2, len(own), len(orders))) / np.sqrt(len(orders))
         velocity = sizes[0] @ np.cos(phases) + sizes[1] @ np.sin(phases)
-        velocity *= GENTLE * task.limits.velocity[:, None]
+        velocity *= GENTLE * task.speed[:, None]
         # The motion of the basis whose velocity is nearest to that.
         fit, *_ = np.linalg.lstsq(basis.rows(time, 1), velocity.T, rcond=1e-9)
         own[:, : basis.size] = fit.T
@@ -231,7 +231,7 @@ def _excess(task: Task, x: Array, times: int) -> Array:
 
 
 def _tightest(problem: Problem, seed: int) -> str:
-    """Say which limit a random motion of half the velocity limits breaks most."""
+    """Say which limit a random motion breaks most."""
     task = problem.task
     limits, robot = task.limits, task.smooth.model.robot
     values = np.abs(problem.limited(_random_motion(task, np.random.default_rng([seed, 0])))).max(axis=1)

@@ -174,7 +174,7 @@ def random_motion(task: Task, random: np.random.Generator) -> Array:
         size = random.normal(size=(2, len(orders))) / np.sqrt(len(orders))
         if n < 2 or random.uniform() >= STILL:
             share = np.exp(random.uniform(np.log(SLOWEST), 0.0))
-            velocity[j] = share * limits.velocity[j] * (size[0] @ np.cos(phases) + size[1] @ np.sin(phases))
+            velocity[j] = share * task.speed[j] * (size[0] @ np.cos(phases) + size[1] @ np.sin(phases))
     x = velocity @ _inverse(basis, 1).T
     place = random.uniform(limits.lower, limits.upper)
     return np.asarray(_placed(basis, x, place - task.posture)[None])

@@ -30,6 +30,14 @@ def test_a_joint_without_limits_is_said(tmp_path):
         limits_of(load_robot(urdf), ranges={"j1": (-3.0, 3.0)})
 
 
+def test_a_range_that_is_a_lock_is_said():
+    with pytest.raises(
+        RobotError, match=r"joint 'joint1' cannot move: its range is 0\.\.1e-05 rad; .* or lock the joint"
+    ):
+        limits_of(SCARA, ranges={"joint1": (0.0, 1e-5)})
+    assert limits_of(SCARA, ranges={"joint1": (0.0, 2e-3)}).upper[0] < 2e-3
+
+
 @pytest.mark.parametrize(
     ("given", "said"),
     [

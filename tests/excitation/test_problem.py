@@ -7,6 +7,7 @@ import pytest
 
 from scara_ident.excitation import ExcitationTrajectory, information_of
 from scara_ident.excitation.clearance import REACH, TOLERANCE
+from scara_ident.excitation.limits import limits_of
 from scara_ident.excitation.problem import row_names
 from scara_ident.excitation.search import _random_motion
 from scara_ident.excitation.verification import grid
@@ -38,6 +39,19 @@ def test_gradient_and_slopes_are_those_of_differences(name):
         distances = np.array([name.startswith("distance") for name, _ in row_names(problem.task.limits, x.shape[1])])
         np.testing.assert_allclose(pushed[~distances], change[~distances], atol=1e-7 * np.abs(pushed).max())
         np.testing.assert_allclose(pushed[distances], change[distances], atol=2.0 * TOLERANCE / REACH)
+
+
+def test_no_motion_is_faster_than_its_range_and_its_frequencies_leave_it():
+    """That of the highest frequency alone is just as fast (Bernstein), and a limit below it counts."""
+    limits = limits_of(load_robot(), share=1.0, velocities={"joint1": 1000.0, "joint2": 0.1})
+    task = replace(small_problem(rigid_model(load_robot()), lengths=((8.0, 6), (4.0, 5))).task, limits=limits)
+    half = 0.5 * (limits.upper - limits.lower)
+    np.testing.assert_allclose(task.speed, [2.0 * np.pi * (5 / 4.0) * half[0], 0.1])
+    time = np.linspace(0.0, 4.0, 4001)
+    for seed in range(20):
+        x = np.random.default_rng(seed).normal(size=task.bases[1].size)
+        q, v = (task.bases[1].rows(time, k) @ x for k in range(2))
+        assert np.max(np.abs(v)) <= task.speed[0] / half[0] * np.max(np.abs(q))
 
 
 def test_motions_of_two_lengths_count_by_their_samples():
