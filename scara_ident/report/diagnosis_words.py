@@ -44,18 +44,17 @@ def told(diagnosis: Diagnosis) -> tuple[tuple[str, ...], tuple[str, ...]]:
 
 
 def _others(diagnosis: Diagnosis) -> list[str]:
-    found = []
-    if diagnosis.verdict == "complete":
-        found.append("The model lacks nothing that these recordings can show.")
-    if diagnosis.verdict == "undecided":
-        found.append(_undecided(diagnosis))
-        found += _not_shown(diagnosis.evidence)
+    found = _headline(diagnosis)
     for effect in diagnosis.effects:
         found += _found(effect, diagnosis)
         found += [_directly(name, parameter, effect.parameters[name]) for name, parameter in effect.direct.items()]
         if effect.confounded_with:
             others = ", ".join(confounder.label for confounder in effect.confounded_with)
             found.append(f"These recordings cannot tell it from: {others}.")
+    if diagnosis.verdict == "undecided":
+        found += _not_shown(diagnosis.evidence)
+    if diagnosis.effects:
+        found += _errors(diagnosis)
     for guess in diagnosis.tentative:
         where = f" on {guess.joint}" if guess.joint else ""
         gain = f"would remove {max(guess.gain, 0.0):.0%} of the squared residual"
@@ -65,24 +64,6 @@ def _others(diagnosis: Diagnosis) -> list[str]:
     found += [
         _of_rotor(rotor, diagnosis) for rotor in diagnosis.rotors if not rotor.stated and rotor.factor is not None
     ]
-    kind, old, new = "held-out", diagnosis.validation_before, diagnosis.validation_after
-    if not old.data.recordings:
-        kind, old, new = "training", diagnosis.training_before, diagnosis.training_after
-    if diagnosis.effects:
-        pairs = zip(
-            diagnosis.robot.joints,
-            rms_of(diagnosis.before.value, old),
-            rms_of(diagnosis.after.value, new),
-            strict=True,
-        )
-        errors = [(joint, a, b) for joint, a, b in pairs if a is not None and b is not None]
-        units = {joint: diagnosis.robot.torque_unit(j) for j, joint in enumerate(diagnosis.robot.joints)}
-        changes = [f"{joint} {a:.3g} to {b:.3g} {units[joint]}" for joint, a, b in errors]
-        found.append(f"Rms error on the {kind} recordings: {'; '.join(changes)}.")
-        worse = [f"{joint} ({b / a:.2g} times)" for joint, a, b in errors if b > WORSE * a > 0.0]
-        if worse:
-            instead = "there use the model without it, or fit further motions"
-            found.append(f"Worse with what was found than without: {', '.join(worse)}; {instead}.")
     biased = bias_said(diagnosis.after)
     if biased is not None:
         found.append(biased)
@@ -90,6 +71,16 @@ def _others(diagnosis: Diagnosis) -> list[str]:
         found.append(
             "No trajectory was repeated, so the noise floor is not known: record each trajectory twice or more."
         )
+    return found
+
+
+def _headline(diagnosis: Diagnosis) -> list[str]:
+    """Say the verdict; what was found says of itself that it explains."""
+    found = []
+    if diagnosis.verdict == "complete":
+        found.append("The model lacks nothing that these recordings can show.")
+    if diagnosis.verdict == "undecided":
+        found.append(_undecided(diagnosis))
     remainder = diagnosis.unexplained
     if remainder is not None:
         unit = diagnosis.robot.torque_unit(diagnosis.robot.joints.index(remainder.joint))
@@ -100,6 +91,24 @@ def _others(diagnosis: Diagnosis) -> list[str]:
         )
         if not remainder.signals:
             found += [f"To do first: {step.sentence()}" for step in next_steps(diagnosis)[:1]]
+    return found
+
+
+def _errors(diagnosis: Diagnosis) -> list[str]:
+    """Say what was left before and is left after, on recordings held out if there are any, and where that is worse."""
+    kind, old, new = "held-out", diagnosis.validation_before, diagnosis.validation_after
+    if not old.data.recordings:
+        kind, old, new = "training", diagnosis.training_before, diagnosis.training_after
+    before, after = rms_of(diagnosis.before.value, old), rms_of(diagnosis.after.value, new)
+    pairs = zip(diagnosis.robot.joints, before, after, strict=True)
+    errors = [(joint, a, b) for joint, a, b in pairs if a is not None and b is not None]
+    units = {joint: diagnosis.robot.torque_unit(j) for j, joint in enumerate(diagnosis.robot.joints)}
+    changes = [f"{joint} {a:.3g} to {b:.3g} {units[joint]}" for joint, a, b in errors]
+    found = [f"Rms error on the {kind} recordings: {'; '.join(changes)}."]
+    worse = [f"{joint} ({b / a:.2g} times)" for joint, a, b in errors if b > WORSE * a > 0.0]
+    if worse:
+        instead = "there use the model without it, or fit further motions"
+        found.append(f"Worse with what was found than without: {', '.join(worse)}; {instead}.")
     return found
 
 

@@ -12,6 +12,7 @@ from scara_ident.diagnosis.effect_parameters import RotorInertia
 from scara_ident.diagnosis.held_out_gain import HeldOutGain
 from scara_ident.diagnosis.next_steps import next_steps
 from scara_ident.diagnosis.outcome import Unexplained
+from scara_ident.diagnosis.tentative import TentativeEffect
 from scara_ident.effects import Parameter
 from scara_ident.effects.position import Spring
 from scara_ident.estimation.run_offsets import rms_of
@@ -137,6 +138,25 @@ def test_an_effect_that_is_there_and_whose_size_is_not_told_says_so(result):
     assert "In doubt: spring on joint2" in doubted
     assert "not settled" not in doubted
     assert diagnosis_dict(unsure)["effects"][0]["size_told"] is False
+
+
+def test_the_verdict_comes_first_then_what_was_found_then_why_not_more_and_what_is_worth_a_look_after_the_errors(
+    result,
+):
+    """The line of a report that stands out was that of an effect worth a look, above what is unexplained."""
+    guess = TentativeEffect("time_delay", None, "a delay", "could be chance", "two speeds", 0.01, 0.2, None)
+    starts = {
+        "undecided": ["Undecided", "Found spring", "On joint1", "Rms error", "Worth a look"],
+        "unexplained": ["Unexplained", "Found spring", "Rms error", "Worth a look"],
+    }
+    doubted = tuple(replace(item, shown=False, why="record more") for item in result.evidence)
+    remainder = Unexplained("joint1", ("position of joint1",), 0.1, 0.5)
+    for verdict, wanted in starts.items():
+        left = remainder if verdict == "unexplained" else None
+        said = sentences(replace(result, verdict=verdict, unexplained=left, tentative=(guess,), evidence=doubted))
+        places = [next(k for k, words in enumerate(said) if words.startswith(start)) for start in wanted]
+        assert places == sorted(places), said
+        assert places[0] == 0
 
 
 def test_where_what_is_left_depends_on_no_signal_it_is_said_what_to_do_first(result):
