@@ -12,14 +12,14 @@ PACKAGE = "example-robot-data"
 
 
 def is_name(source: Path, folder: Path = Path()) -> bool:
-    """Tell whether a word is a robot's name: one word without a suffix, and no file in the folder it is read from.
+    """Tell whether a word is a robot's name: one word without a suffix, or that of a robot, and no file in the folder it is read from.
 
     A folder of that name, as results are kept in, hides no robot that there is.
     """
-    if len(source.parts) != 1 or source.suffix:
-        return False
     here = folder / source
-    return not here.exists() or (here.is_dir() and _plain(source.name) in example_robots())
+    if len(source.parts) != 1 or here.is_file():
+        return False
+    return (not here.exists() and not source.suffix) or _plain(source.name) in example_robots()
 
 
 def urdf_of(source: Path) -> Path:

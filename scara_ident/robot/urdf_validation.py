@@ -13,6 +13,8 @@ MOVABLE = ("revolute", "continuous", "prismatic")
 HEAVIEST = 1e9
 # Moments that are 0 but for the arithmetic of what wrote them may be below it by this share of the largest.
 ROUNDING = 1e-9
+# Radius of gyration, m, below which a mass is a point: what is left of subtracting its own offset is rounding.
+NO_WIDTH = 1e-7
 # The robot is as long as the offsets of its joints and their strokes, and at least a metre; a centre of mass this many
 # times as far from its link is in another unit.
 FARTHEST_COM = 10.0
@@ -150,7 +152,7 @@ def _impossible_bodies(tree: ElementTree.Element) -> str | None:
         lacking = next((key for key in ("mass", *INERTIA) if key not in given), None)
         if lacking is not None:
             return f"{owner}: its <inertial> has no {lacking}; give it, or leave out <inertial>"
-        rounding = ROUNDING * max(abs(given[key]) for key in INERTIA)
+        rounding = max(ROUNDING * max(abs(given[key]) for key in INERTIA), NO_WIDTH**2 * given["mass"])
         for key in ("mass", "ixx", "iyy", "izz"):
             if given[key] < (0.0 if key == "mass" else -rounding):
                 return f"{owner}: {key} is {given[key]:g}, and nothing has less than 0; correct it"

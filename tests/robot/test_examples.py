@@ -37,6 +37,8 @@ def test_every_name_can_be_given_on_a_command_line():
     assert len(robots) > 50
     assert all(path.is_file() for path in robots.values())
     assert all(example_urdf(name.upper()) == path for name, path in robots.items())
+    # Also that with a point in it.
+    assert all(is_name(Path(name)) for name in robots)
 
 
 def test_an_unknown_name_is_answered_with_similar_ones():

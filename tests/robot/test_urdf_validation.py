@@ -100,6 +100,11 @@ def test_a_right_robot_has_no_fault_and_neither_have_those_of_makers():
     assert fault() == ""
     # What the arithmetic of a CAD program leaves of a moment of 0.
     assert fault('ixx="0.1"', 'ixx="-5.4e-20"') == ""
+    # All three of a point mass are, as of the iCub's hip, and no more than that.
+    point = '<inertia ixx="{0}" ixy="0" ixz="0" iyy="{0}" iyz="0" izz="0"/>'
+    whole = '<inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/>'
+    assert fault(whole, point.format(-5.4e-20)) == ""
+    assert fault(whole, point.format(-1e-9)) == "link 'l1': ixx is -1e-09, and nothing has less than 0; correct it"
     assert (
         fault(
             '<link name="l2"/>',
