@@ -15,6 +15,7 @@ from scara_ident.estimation.estimate import PAPER_SAMPLES
 from scara_ident.estimation.noise_bias import bias_sentence
 from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.pushing import BEYOND_CHANCE, pushes
+from scara_ident.estimation.run_variation import LEAST_RUNS
 from scara_ident.estimation.saved import estimate_dict
 from scara_ident.estimation.urdf_scale import scale_sentence, urdf_scale
 from scara_ident.estimation.urdf_weight import rotor_sentence, told_scale
@@ -28,6 +29,8 @@ from scara_ident.robot.robot import Robot
 
 # Names in a sentence, at the most.
 MOST_NAMED = 12
+# So few recordings in words.
+NUMBERS = {1: "one recording", 2: "two recordings"}
 # What each shape of friction means.
 SHAPES = {
     "lubricated": "takes energy out, and grows ever less with speed",
@@ -166,6 +169,10 @@ def _others(identification: Identification) -> list[str]:
     found.append(weights_said(identification.estimate))
     if identification.estimate.variation:
         found += [f"{said}." for said in identification.estimate.variation.sentences(robot)]
+    runs = len(identification.training.data.recordings)
+    if runs < LEAST_RUNS:
+        few = "How runs differ" if runs == 1 else "How runs differ but for offsets"
+        found.append(f"{few} is not known from {NUMBERS[runs]}, and is in no standard deviation: record three or more.")
     biased = bias_said(identification.estimate)
     if biased is not None:
         found.append(biased)

@@ -182,6 +182,20 @@ def test_friction_that_pushes_is_named_where_no_parameter_of_its_own_is_below_ze
     assert said in sentences(replace(result, estimate=changed))
 
 
+def test_of_few_recordings_it_is_said_that_their_standard_deviations_hold_no_run_variation(result):
+    """On five measured arms parameters of one recording each, or of half of one, lay 1.2 to 1.7 times as far apart as their stds say (rms)."""
+    third = made([run("OJD_1", 1), run("OJD_2", 2), run("OJD_3", 3)], method="wls")
+    one = made([run("OJD_1", 1)], method="wls")
+    few = [[said for said in sentences(each) if "is in no standard deviation" in said] for each in (one, result, third)]
+    assert few == [
+        ["How runs differ is not known from one recording, and is in no standard deviation: record three or more."],
+        [
+            "How runs differ but for offsets is not known from two recordings, and is in no standard deviation: record three or more."
+        ],
+        [],
+    ]
+
+
 def test_notes_are_handed_on(result):
     assert identification_dict(replace(result, notes=("seen",)))["notes"] == ["seen"]
 
