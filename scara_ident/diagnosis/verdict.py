@@ -7,6 +7,7 @@ from functools import partial
 from typing import Literal
 
 from scara_ident.diagnosis.audit import left_open
+from scara_ident.diagnosis.braking_evidence import braking_evidence
 from scara_ident.diagnosis.criteria import SelectionCriteria
 from scara_ident.diagnosis.even_evidence import even_evidence
 from scara_ident.diagnosis.evidence import Evidence, evidence, held_out_evidence
@@ -34,7 +35,7 @@ def weighed_evidence(
 
     Every witness that may speak against it is asked in turn, and the first that does is the one that is told: what the search
     left open, what is left of the training recordings, lines in it, one of them beside all others, its parts beside each other,
-    what comes late in all, those held out, and there each effect.
+    what comes late in all, those held out, and there each effect. Friction that pushes is told whatever they say.
 
     Parameters
     ----------
@@ -54,7 +55,8 @@ def weighed_evidence(
     training, others = (rms_of(after.value, item) for item in (outcome.training, held_out.undisturbed))
     shown = held_out_evidence(shown, training, others, held_out.unsure, held_out.apart, criteria)
     gains = {item.label: item.held_out for item in effects if item.held_out is not None}
-    return spoken_against(shown, gains, criteria)
+    shown = spoken_against(shown, gains, criteria)
+    return braking_evidence(shown, after, outcome.training, effects)
 
 
 def verdict_of(outcome: Outcome, effects: Sequence[FoundEffect], shown: Sequence[Evidence]) -> Verdict:

@@ -30,6 +30,8 @@ SLOW_SHARE = 0.03
 # Share of the rate up to which a line is whole; what is left of it an octave higher has its alias at 0.4 of the rate, twice
 # the widest band that is chosen, and of ramps between 0.2 and 0.8 this one leaves the least in the band.
 WHOLE_SHARE = 0.3
+# Orders this near a whole number, as a share, are taken for it; how far the arm travels tells them to some thousandths.
+WHOLE_ORDER = 5e-3
 # No encoder errs by more than this, rad of the motor; beyond it the linear form ends too.
 LARGEST_ECCENTRICITY = 0.1
 
@@ -88,8 +90,13 @@ class TorqueRipple(PerMotorTurn):
     experiment = "move slowly at constant speed over several motor turns and record at a high rate"
 
     def description(self, scene: Scene, member: Member) -> str:
-        """Say one period as one."""
-        return super().description(scene, member).replace(" of 1 periods ", " of 1 period ")
+        """Say one period as one, and behind which reduction they would be a whole number: one that is not is often stated wrong."""
+        said = super().description(scene, member).replace(" of 1 periods ", " of 1 period ")
+        order, stated = member.nonlinear[0], abs(float(scene.robot.reduction[member.place]))
+        whole = round(order)
+        if stated == 1.0 or not 1 <= whole <= max(ORDERS) or abs(order / whole - 1.0) < WHOLE_ORDER:
+            return said
+        return f"{said}, which would be {whole} behind a reduction of {stated * order / whole:.4g}"
 
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
         """Return sine and cosine of the order times the motor's angle."""

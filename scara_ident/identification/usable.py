@@ -18,7 +18,7 @@ from scara_ident.model.model import TorqueModel
 from scara_ident.motion.motion import torque_of
 from scara_ident.motion.position_noise import coarse_positions
 from scara_ident.motion.prepared import PreparedData, PreparedRecording, prepare
-from scara_ident.motion.velocity_audit import VelocityAudit, VelocityFault, audit_velocity, told_together
+from scara_ident.motion.velocity_audit import audit_velocity, velocity_remarks
 from scara_ident.recording.recording import Recording
 from scara_ident.recording.shared_samples import copies_among
 from scara_ident.threads import side_by_side
@@ -196,7 +196,8 @@ def data_notes(*data: PreparedData) -> list[str]:
     items = [item for part in data for item in part.recordings]
     audits = side_by_side(lambda item: audit_velocity(item.recording, item.longest.stretch), items)
     notes = _once((item.name, finding.message) for item in items for finding in item.recording.findings)
-    notes += _velocity_notes(items, audits)
+    audited = [(item.name, item.longest.rate, own) for item, own in zip(items, audits, strict=True)]
+    notes += [f"{_listed(names)}: {remark}" for names, remark in velocity_remarks(audited)]
     return [*notes, *(note for part in data for note in part.motions.notes)]
 
 
@@ -215,22 +216,6 @@ def _in_one(alike: Mapping[str, Sequence[str]]) -> list[str]:
         return [f"{_listed(own)}: {remark}" for remark, own in alike.items()]
     first, own = next(iter(alike.items()))
     return [f"{_listed(names)}: {first}; numbers of {own[0]}"]
-
-
-def _velocity_notes(items: Sequence[PreparedRecording], audits: Sequence[Sequence[VelocityAudit]]) -> list[str]:
-    """Say of which joints the recorded velocity is not used; the same fault of the same joints in one line."""
-    found: dict[tuple[tuple[str, ...], str], tuple[list[str], list[VelocityFault]]] = {}
-    for item, audited in zip(items, audits, strict=True):
-        faults = [(audit.joint, fault) for audit in audited if (fault := audit.fault(item.longest.rate)) is not None]
-        for words in dict.fromkeys(fault.words for _, fault in faults):
-            own = [(joint, fault) for joint, fault in faults if fault.words == words]
-            names, sizes = found.setdefault((tuple(joint for joint, _ in own), words), ([], []))
-            names.append(item.name)
-            sizes += [fault for _, fault in own]
-    return [
-        f"{_listed(names)}: recorded velocity of {', '.join(joints)} is not used: {told_together(sizes)}"
-        for (joints, _), (names, sizes) in found.items()
-    ]
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -18,6 +18,8 @@ from scara_ident.inspection.chain import arm_of, longest_chain
 from scara_ident.inspection.guess import Guess, guess
 from scara_ident.inspection.names import Meaning, meaning, meanings_by_place, nameless
 from scara_ident.inspection.text import description_text, mapping
+from scara_ident.motion.motion import stretches
+from scara_ident.motion.velocity_audit import audit_velocity, velocity_remarks
 from scara_ident.recording.files import column_names, is_bag_folder, read_columns
 from scara_ident.recording.recording import Recording, read_recording
 from scara_ident.robot.description import check_description
@@ -163,13 +165,14 @@ def inspect_file(
     scale = None if recording is None else _scale(recording, arm, text)
     if scale is not None:
         found.notes.append(scale)
+        text = description_text(found, arm, described, where, path)
     return Inspection(
         path=path,
         topics=topics,
         topic=topic,
         columns=_guessed_columns(names, numbers, meanings, found, every),
         mapping=described,
-        notes=tuple(found.notes),
+        notes=(*found.notes, *_of_velocity(recording)),
         problems=tuple(found.problems),
         recording=recording,
         refusal=refusal,
@@ -194,7 +197,10 @@ def _by_description(path: Path, robot: Robot) -> Inspection:
         else:
             columns.append(_column(name, numbers.get(name), *_by_name(name), False))
     recording, refusal = _read(path, robot)
-    return Inspection(path, topics, channels.topic, tuple(columns), {}, recording=recording, refusal=refusal)
+    notes = _of_velocity(recording)
+    return Inspection(
+        path, topics, channels.topic, tuple(columns), {}, notes=notes, recording=recording, refusal=refusal
+    )
 
 
 def _topics(path: Path) -> dict[str, int]:
@@ -311,6 +317,18 @@ def _scale(recording: Recording, arm: Robot, text: str) -> str | None:
     from scara_ident.inspection.scale import scale_note
 
     return scale_note(recording, _described(text, arm))
+
+
+def _of_velocity(recording: Recording | None) -> tuple[str, ...]:
+    """Say how a recorded velocity differs from the slope of the positions."""
+    if recording is None or recording.velocity is None:
+        return ()
+    try:
+        longest = max(stretches(recording), key=lambda part: len(part.time))
+    except RecordingError:
+        return ()
+    remarks = velocity_remarks([(recording.name, longest.rate, audit_velocity(recording, longest))])
+    return tuple(remark for _, remark in remarks)
 
 
 def _read(path: Path, robot: Robot) -> tuple[Recording | None, str | None]:

@@ -18,6 +18,8 @@ BAND = 4.0
 MOST_LEFT = 0.35
 # A scale within this factor of 1 is what a URDF with rough masses gives.
 USUAL = 2.0
+# A scale that is larger on every joint is as likely the reduction of a gear in front of which torque was measured: of arms it is 30 and more.
+LIKE_A_GEAR = 20.0
 
 
 def scale_note(recording: Recording, robot: Robot) -> str | None:
@@ -40,15 +42,22 @@ def scale_note(recording: Recording, robot: Robot) -> str | None:
         scales = _scales(recording, robot)
     except ScaraIdentError:
         return None
-    told = [
-        f"{scale:.2g} {robot.torque_unit(j)} on {robot.joints[j]}"
-        for j, scale in scales.items()
-        if not 1.0 / USUAL < scale < USUAL
-    ]
+    told = {j: scale for j, scale in scales.items() if not 1.0 / USUAL < scale < USUAL}
     if not told:
         return None
-    asked = "to be stated" if min(scales.values()) > 0.0 else "to be stated, negative where the sign is opposite"
-    return f"effort: by the URDF's masses, a recorded unit is roughly {', '.join(told)}: is effort_gain {asked}?"
+    sizes = {j: abs(scale) for j, scale in scales.items()}
+    near = [robot.joints[j] for j, size in sizes.items() if 1.0 / USUAL < size < USUAL]
+    asked = "is effort_gain to be stated" + (
+        ", negative where the sign is opposite" if min(told.values()) < 0.0 else ""
+    )
+    beside = ""
+    if near and any(not 1.0 / USUAL < sizes[j] < USUAL for j in told):
+        # A URDF is often right of the large links and has the small ones roughly.
+        beside, asked = f", and near 1 on {', '.join(near)}", f"{asked}, or are the masses there others"
+    if min(sizes.values()) > LIKE_A_GEAR:
+        asked += ", or is it measured in front of a gear (effort_side: motor, reduction)"
+    said = ", ".join(f"{scale:.2g} {robot.torque_unit(j)} on {robot.joints[j]}" for j, scale in told.items())
+    return f"effort: by the URDF's masses, a recorded unit is roughly {said}{beside}: {asked}?"
 
 
 def _scales(recording: Recording, robot: Robot) -> dict[int, float]:

@@ -17,6 +17,8 @@ GAIN_ERROR = 0.02
 UNRELATED = 0.05
 # Cut-off for the comparison as a share of the sample rate.
 COMPARE_BAND = 0.04
+# The words of a velocity that is another multiple of the slope.
+OTHER_UNIT = "it is {} times the derivative of the position"
 
 
 @dataclass(frozen=True)
@@ -35,13 +37,6 @@ class VelocityFault:
     words: str
     size: float = 0.0
     form: str = ""
-
-
-def told_together(faults: Sequence[VelocityFault]) -> str:
-    """Return the words of the same fault on several joints or recordings, with the range of its size."""
-    sizes = [fault.size for fault in faults]
-    ends = dict.fromkeys(format(size, faults[0].form) for size in (min(sizes), max(sizes)))
-    return faults[0].words.format(" to ".join(ends))
 
 
 @dataclass(frozen=True)
@@ -71,7 +66,7 @@ class VelocityAudit:
             return VelocityFault("{} of it is not the derivative of the position", self.unrelated, ".0%")
         if abs(self.gain - 1.0) > GAIN_ERROR:
             degrees = " (looks like degrees)" if abs(self.gain / np.degrees(1.0) - 1.0) < GAIN_ERROR else ""
-            return VelocityFault(f"it is {{}} times the derivative of the position{degrees}", self.gain, ".4g")
+            return VelocityFault(f"{OTHER_UNIT}{degrees}", self.gain, ".4g")
         if abs(self.lag) * rate > LAG_SAMPLES:
             verb = "lags" if self.lag > 0 else "leads"
             return VelocityFault(f"it {verb} the position by {{}} ms, as a filter does", abs(self.lag) * 1e3, ".2g")
@@ -81,6 +76,54 @@ class VelocityAudit:
         """Return `fault` in words."""
         fault = self.fault(rate)
         return None if fault is None else told_together([fault])
+
+
+def told_together(faults: Sequence[VelocityFault], moving: int = 1) -> str:
+    """Return the words of the same fault on several joints or recordings, with the range of its size.
+
+    Parameters
+    ----------
+    moving : int, optional
+        Joints that move in each recording: a factor that they all share may be that of time.
+    """
+    sizes = [fault.size for fault in faults]
+    ends = dict.fromkeys(format(size, faults[0].form) for size in (min(sizes), max(sizes)))
+    said = faults[0].words.format(" to ".join(ends))
+    alike = max(sizes) - min(sizes) < GAIN_ERROR * min(sizes)
+    if faults[0].words == OTHER_UNIT and moving > 1 and alike:
+        return f"{said} on every joint: is the unit or rate of time another, or that of velocity?"
+    return said
+
+
+def velocity_remarks(audited: Sequence[tuple[str, float, Sequence[VelocityAudit]]]) -> list[tuple[list[str], str]]:
+    """Say of which joints the recorded velocity is not used, and why; the same fault of the same joints once.
+
+    Parameters
+    ----------
+    audited : sequence of (str, float, sequence of VelocityAudit)
+        Name and rate of each recording, with what `audit_velocity` says of it.
+
+    Returns
+    -------
+    list of (list of str, str)
+        Names of recordings, and the remark on them.
+    """
+    found: dict[tuple[tuple[str, ...], str, bool], tuple[list[str], list[VelocityFault]]] = {}
+    for name, rate, audits in audited:
+        faults = [(audit.joint, fault) for audit in audits if (fault := audit.fault(rate)) is not None]
+        for words in dict.fromkeys(fault.words for _, fault in faults):
+            own = [(joint, fault) for joint, fault in faults if fault.words == words]
+            key = tuple(joint for joint, _ in own), words, len(own) == len(audits)
+            names, sizes = found.setdefault(key, ([], []))
+            names.append(name)
+            sizes += [fault for _, fault in own]
+    return [
+        (
+            names,
+            f"recorded velocity of {', '.join(joints)} is not used: {told_together(sizes, len(joints) if every else 1)}",
+        )
+        for (joints, _, every), (names, sizes) in found.items()
+    ]
 
 
 def audit_velocity(recording: Recording, part: Stretch) -> tuple[VelocityAudit, ...]:

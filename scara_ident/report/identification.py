@@ -14,21 +14,23 @@ from scara_ident.estimation.consistent.shape import ShapeChoice
 from scara_ident.estimation.estimate import PAPER_SAMPLES
 from scara_ident.estimation.noise_bias import bias_sentence
 from scara_ident.estimation.observations import Observations
+from scara_ident.estimation.pushing import BEYOND_CHANCE, pushes
+from scara_ident.estimation.run_variation import LEAST_RUNS
 from scara_ident.estimation.saved import estimate_dict
 from scara_ident.estimation.urdf_scale import scale_sentence, urdf_scale
 from scara_ident.estimation.urdf_weight import rotor_sentence, told_scale
 from scara_ident.export.result import KEY, rebuild_entry
 from scara_ident.identification.identify import Identification, not_told_from_zero, undetermined, worst_validation
 from scara_ident.manners import listed
+from scara_ident.model.terms.friction import Friction
 from scara_ident.model.urdf_values import urdf_values
 from scara_ident.report.doubts import doubts
 from scara_ident.robot.robot import Robot
 
 # Names in a sentence, at the most.
 MOST_NAMED = 12
-# Standard deviations by which no parameter of an arm comes to lie below zero by chance, where a hundred may: one would in 300 identifications by
-# noise of a known size, in some more where it is known from few blocks.
-BEYOND_CHANCE = 4.0
+# So few recordings in words.
+NUMBERS = {1: "one recording", 2: "two recordings"}
 # What each shape of friction means.
 SHAPES = {
     "lubricated": "takes energy out, and grows ever less with speed",
@@ -158,7 +160,7 @@ def _others(identification: Identification) -> list[str]:
         found.append(
             f"No real arm has these parameters: {'; '.join(possible.reasons)}. Use --method consistent for one that can exist."
         )
-        below = below_zero_said(identification.estimate)
+        below = below_zero_said(identification.estimate, identification.training)
         if below is not None:
             found.append(below)
     small = not_told_from_zero(identification)
@@ -167,6 +169,10 @@ def _others(identification: Identification) -> list[str]:
     found.append(weights_said(identification.estimate))
     if identification.estimate.variation:
         found += [f"{said}." for said in identification.estimate.variation.sentences(robot)]
+    runs = len(identification.training.data.recordings)
+    if runs < LEAST_RUNS:
+        few = "How runs differ" if runs == 1 else "How runs differ but for offsets"
+        found.append(f"{few} is not known from {NUMBERS[runs]}, and is in no standard deviation: record three or more.")
     biased = bias_said(identification.estimate)
     if biased is not None:
         found.append(biased)
@@ -175,27 +181,38 @@ def _others(identification: Identification) -> list[str]:
     return found
 
 
-def below_zero_said(estimate: Estimate) -> str | None:
-    """Say whether chance makes what lies below zero where no arm's parameter can; None where none does.
+def below_zero_said(estimate: Estimate, observations: Observations) -> str | None:
+    """Say whether chance makes what lies below zero where no arm's parameter can, or friction that pushes; None where none does.
 
     Parameters
     ----------
     estimate : Estimate
         Not held to what an arm can have.
+    observations : Observations
+        That it is of: friction is asked at the speeds in them.
     """
-    below = [k for k, column in enumerate(estimate.model.columns) if column.nonnegative and estimate.value[k] < 0.0]
+    robot, columns = estimate.model.robot, estimate.model.columns
+    below = [k for k, column in enumerate(columns) if column.nonnegative and estimate.value[k] < 0.0]
     size = {k: -estimate.value[k] / estimate.std[k] for k in below if 0.0 < estimate.std[k] < np.inf}
+    beyond = {columns[k].name: stds for k, stds in size.items() if stds > BEYOND_CHANCE}
+    rubbing = [column for term in estimate.model.terms if isinstance(term, Friction) for column in term.columns]
+    for j, push in enumerate(pushes(estimate, observations)):
+        own = [column.name for column in rubbing if column.joint == robot.joints[j] and column.name in beyond]
+        # Once of each joint, by what is surest.
+        if push is not None and push.stds > max((beyond[name] for name in own), default=0.0):
+            beyond = {name: stds for name, stds in beyond.items() if name not in own}
+            beyond[f"friction of {robot.joints[j]} at {push.speed:.2g} {robot.position_unit(j)}/s"] = push.stds
+    if beyond:
+        most_first = sorted(beyond, key=lambda name: -beyond[name])
+        said = listed([f"{name} by {beyond[name]:.2g} standard deviations" for name in most_first], MOST_NAMED)
+        return (
+            f"Below zero by more than chance: {said}. Something that the model lacks or the description has wrong is in them, and may be in "
+            "any parameter; standard deviations hold none of it, and a possible arm hides it: diagnose the recordings."
+        )
     if not size:
         return None
-    names, beyond = estimate.model.names, sorted((k for k in size if size[k] > BEYOND_CHANCE), key=lambda k: -size[k])
-    if not beyond:
-        most = max(size, key=lambda k: size[k])
-        return f"What cannot be negative is so by no more than chance: {names[most]} by {size[most]:.2g} standard deviations."
-    said = listed([f"{names[k]} by {size[k]:.2g} standard deviations" for k in beyond], MOST_NAMED)
-    return (
-        f"Below zero by more than chance: {said}. Something that the model lacks or the description has wrong is in them, and may be in "
-        "any parameter; standard deviations hold none of it, and a possible arm hides it: diagnose the recordings."
-    )
+    most = max(size, key=lambda k: size[k])
+    return f"What cannot be negative is so by no more than chance: {columns[most].name} by {size[most]:.2g} standard deviations."
 
 
 def weights_said(estimate: Estimate) -> str:

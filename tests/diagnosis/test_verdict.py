@@ -52,7 +52,9 @@ def test_every_witness_is_heard():
     shown = weighed_evidence(outcome, louder, (), NONE, CRITERIA)
     assert not any(item.shown for item in shown)
     assert all("on the recordings held out is" in item.why for item in shown)
-    effect = SimpleNamespace(label="spring of joint1", held_out=HeldOutGain(-0.1, 0.0, 0.01, "joint2", 0.1, 0.2))
+    effect = SimpleNamespace(
+        label="spring of joint1", joint="joint1", held_out=HeldOutGain(-0.1, 0.0, 0.01, "joint2", 0.1, 0.2)
+    )
     first, second = weighed_evidence(outcome, held_out, [effect], NONE, CRITERIA)
     assert first.shown
     assert not second.shown

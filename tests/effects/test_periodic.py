@@ -122,6 +122,17 @@ def test_one_is_said_in_the_singular():
     assert EncoderEccentricity().description(scene, Member(0, (1.0,))) == "an encoder that errs once per motor turn"
 
 
+@pytest.mark.parametrize(
+    ("order", "said"),
+    [(1.595, ", which would be 2 behind a reduction of 79.75"), (2.02, ", which would be 2 behind a reduction of 101"), (2.004, ""), (31.4, ""), (0.3, "")],
+)  # fmt: skip
+def test_periods_that_are_no_whole_number_ask_for_the_reduction(order: float, said: str):
+    """Three wrists of a measured arm had lines of 1.6 and 8 periods behind a reduction taken for 100: behind one of 80 they are 2 and 10."""
+    scene = scene_of(load_robot())
+    assert scene.robot.reduction[0] == 100.0
+    assert TorqueRipple().description(scene, Member(0, (order,))).partition(" per motor turn")[2] == said
+
+
 def test_members_are_those_that_can_be_seen():
     scene = scene_of(load_robot())
     assert Member(0, (2.0,)) in TorqueRipple().members(scene)

@@ -11,7 +11,7 @@ import pytest
 from scara_ident.errors import RecordingError, UsageError
 from scara_ident.inspection.inspection import inspect_file
 from scara_ident.recording.recording import read_recording
-from scara_ident.robot.robot import load_robot
+from scara_ident.robot.robot import embedded_urdf, load_robot
 from tests.inspection.made import MADE, inspected, read_back
 from tests.made_recordings import save
 from tests.recording.files.formats import write_plotjuggler
@@ -40,6 +40,19 @@ def test_a_description_is_checked_on_a_file(tmp_path):
     assert again.recording is not None
     assert again.description is None
     assert [c.joint for c in again.columns if c.channel and c.quantity == "effort"] == ["joint1", "joint2"]
+
+
+@pytest.mark.parametrize("slow", [1.0, 3.0])
+def test_a_clock_that_the_velocities_contradict_is_asked_about(tmp_path, slow: float):
+    """Of a log of 6 ms written at 2 ms nothing was said until it was identified, and there velocity alone was doubted."""
+    made = MADE | {"time": np.asarray(MADE["time"]) * slow}
+    path = save(tmp_path / "a.parquet", made)
+    (tmp_path / "robot.yaml").write_text(
+        f"urdf: {embedded_urdf()}\neffort_side: motor\njoints: {{joint1: {{}}, joint2: {{}}}}\n"
+    )
+    found = inspect_file(path, robot=tmp_path / "robot.yaml")
+    asked = [note for note in found.notes if "is the unit or rate of time another" in note]
+    assert len(asked) == (slow != 1.0)
 
 
 def test_wrong_words_are_bad_usage_and_wrong_files_an_error(tmp_path):

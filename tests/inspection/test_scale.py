@@ -42,14 +42,35 @@ def scale(notes: tuple[str, ...]) -> list[str]:
 
 def test_currents_on_an_arm_that_carries_its_weight_have_a_scale(tmp_path: Path):
     urdf = write_urdf(tmp_path / "arm.urdf", PLANAR_2R)
-    (said,) = scale(inspect_file(recorded(urdf, tmp_path, (12.0, 0.25)), urdf=urdf).notes)
+    found = inspect_file(recorded(urdf, tmp_path, (12.0, 0.25)), urdf=urdf)
+    (said,) = scale(found.notes)
     assert "12 N m on j1, 0.25 N m on j2" in said
+    # What is read once on a terminal stands in the file that is to be mended, too.
+    assert f"# note: {said}" in (found.description or "").splitlines()
 
 
 def test_an_opposite_sign_is_told(tmp_path: Path):
     urdf = write_urdf(tmp_path / "arm.urdf", PLANAR_2R)
     (said,) = scale(inspect_file(recorded(urdf, tmp_path, (1.0, -1.0)), urdf=urdf).notes)
     assert said.endswith("roughly -1 N m on j2: is effort_gain to be stated, negative where the sign is opposite?")
+
+
+def test_where_most_joints_agree_the_masses_are_doubted_as_well(tmp_path: Path):
+    """A UR10's wrist was said to be recorded in units of 0.087 N m beside two joints in N m: its URDF has the wrist's mass on the axis."""
+    urdf = write_urdf(tmp_path / "arm.urdf", PLANAR_2R)
+    (said,) = scale(inspect_file(recorded(urdf, tmp_path, (1.0, 0.2)), urdf=urdf).notes)
+    assert said.endswith(
+        "roughly 0.2 N m on j2, and near 1 on j1: is effort_gain to be stated, or are the masses there others?"
+    )
+
+
+def test_large_scales_of_all_joints_may_be_a_gear(tmp_path: Path):
+    """Motor torques of an arm without reductions in its URDF: 110, 81, 78, 26 and 25 N m were asked for as `effort_gain`."""
+    urdf = write_urdf(tmp_path / "arm.urdf", PLANAR_2R)
+    (said,) = scale(inspect_file(recorded(urdf, tmp_path, (110.0, 50.0)), urdf=urdf).notes)
+    assert said.endswith("or is it measured in front of a gear (effort_side: motor, reduction)?")
+    (current,) = scale(inspect_file(recorded(urdf, tmp_path, (110.0, 5.0)), urdf=urdf).notes)
+    assert current.endswith("is effort_gain to be stated?")
 
 
 def test_torques_are_not_remarked_on(tmp_path: Path):

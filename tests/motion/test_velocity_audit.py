@@ -9,7 +9,7 @@ import pytest
 from scipy.signal import lfilter
 
 from scara_ident.motion.motion import stretches
-from scara_ident.motion.velocity_audit import VelocityAudit, audit_velocity
+from scara_ident.motion.velocity_audit import VelocityAudit, audit_velocity, velocity_remarks
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import Robot, load_robot
 from tests.arms import recording, sines
@@ -83,6 +83,22 @@ def test_another_unit_or_sign_is_said_with_its_factor(truthful: Recording, gain:
         assert verdict is not None
         assert f"{gain:.3g}"[:3] in verdict
         assert "degrees" not in verdict
+
+
+@pytest.mark.parametrize(
+    ("gains", "asked"),
+    [((3.0, 3.0), True), ((1 / 60, 1 / 60), True), ((3.0, 1.0), False), ((3.0, 2.0), False), ((-1.0, -1.0), False)],
+)
+def test_a_factor_that_all_joints_share_may_be_that_of_time(
+    truthful: Recording, gains: tuple[float, float], asked: bool
+):
+    """A log of 6 ms that was written at 2 ms had velocities of 2.996 to 3.001 times the slope, and only they were doubted."""
+    assert truthful.velocity is not None
+    found = audits(replace(truthful, velocity=np.array(gains)[:, None] * truthful.velocity))
+    (names, remark), *_ = velocity_remarks([("a", RATE, found), ("b", RATE, found)])
+    assert names == ["a", "b"]
+    assert remark.startswith("recorded velocity of joint1")
+    assert remark.endswith("on every joint: is the unit or rate of time another, or that of velocity?") is asked
 
 
 def test_an_unrelated_signal_is_found(truthful: Recording):

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from scara_ident.estimation import ConsistentOptions
+from scara_ident.estimation.pushing import pushes
 from scara_ident.estimation.run_variation import JointVariation, RunVariation
 from scara_ident.files import plain
 from scara_ident.report.identification import below_zero_said, identification_dict, sentences
@@ -166,6 +167,35 @@ def test_the_shape_of_friction_and_why_are_said():
     assert said[0] == "Friction is free (anything) on joint1: as asked for."
 
 
+def test_friction_that_pushes_is_named_where_no_parameter_of_its_own_is_below_zero(result):
+    """Curved friction of 17 N m against the motion of a measured joint was passed over: "by no more than chance: Ia4"."""
+    estimate, training = result.estimate, result.training
+    value = np.abs(estimate.value)
+    value[estimate.model.names.index("a12")] = -40.0
+    changed = replace(estimate, value=value)
+    _, push = pushes(changed, training)
+    assert push is not None
+    said = below_zero_said(changed, training)
+    assert said is not None
+    assert f"friction of joint2 at {push.speed:.2g} rad/s by {push.stds:.2g} standard deviations" in said
+    assert "joint1" not in said
+    assert said in sentences(replace(result, estimate=changed))
+
+
+def test_of_few_recordings_it_is_said_that_their_standard_deviations_hold_no_run_variation(result):
+    """On five measured arms parameters of one recording each, or of half of one, lay 1.2 to 1.7 times as far apart as their stds say (rms)."""
+    third = made([run("OJD_1", 1), run("OJD_2", 2), run("OJD_3", 3)], method="wls")
+    one = made([run("OJD_1", 1)], method="wls")
+    few = [[said for said in sentences(each) if "is in no standard deviation" in said] for each in (one, result, third)]
+    assert few == [
+        ["How runs differ is not known from one recording, and is in no standard deviation: record three or more."],
+        [
+            "How runs differ but for offsets is not known from two recordings, and is in no standard deviation: record three or more."
+        ],
+        [],
+    ]
+
+
 def test_notes_are_handed_on(result):
     assert identification_dict(replace(result, notes=("seen",)))["notes"] == ["seen"]
 
@@ -179,7 +209,7 @@ def test_what_cannot_be_negative_is_said_to_be_so_by_chance_or_not(result, stds:
     value, std = np.abs(estimate.value), estimate.std
     coulomb = estimate.model.names.index("a01")
     value[coulomb] = stds * std[coulomb]
-    found = below_zero_said(replace(estimate, value=value))
+    found = below_zero_said(replace(estimate, value=value), result.training)
     if said is None:
         assert found is None
         return
