@@ -184,7 +184,8 @@ def left_open(found: Search, weights: Array, demoted: Sequence[Decision] = ()) -
     """Return the decisions on what is not believed, though it is no noise, with that in words.
 
     Beside the effects found it would remove as much as is asked and is worth a look, and neither the noise of the positions
-    makes it nor what runs were seen to differ by: what is left is not shown to be noise, whatever it looks like.
+    makes it nor what runs were seen to differ by, nor what may be left of a correction of the data: what is left is not shown to be
+    noise, whatever it looks like.
 
     Parameters
     ----------
@@ -207,7 +208,7 @@ def left_open(found: Search, weights: Array, demoted: Sequence[Decision] = ()) -
         p_value = item.examination.p_value * found.tried
         if p_value > step.criteria.significant:
             continue
-        if within_a_step(step, item.candidate) or made_by_noise(step, item):
+        if within_a_step(step, item.candidate) or made_by_noise(step, item) or remainder_objection(step, item):
             continue
         if not (differing and variation_objection(step, item)):
             result.append(
