@@ -88,6 +88,8 @@ def test_beside_a_filter_short_recordings_hold_no_second_gear_and_the_first_is_a
     stiffness = gear.parameters["stiffness"]
     assert abs(stiffness.value - 2000.0) < 2.0 * stiffness.std
     assert stiffness.std < 0.5 * stiffness.value
+    # That the filter makes what is refused leaves nothing open.
+    assert found.verdict == "explained"
 
 
 class SameTorque(Effect):
