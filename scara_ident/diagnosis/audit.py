@@ -11,11 +11,13 @@ from scara_ident.arrays import Array
 from scara_ident.diagnosis.acceptance import Decision, hopeless
 from scara_ident.diagnosis.candidate_tests import Examination
 from scara_ident.diagnosis.candidates import Candidate
+from scara_ident.diagnosis.choice import fitted_with
 from scara_ident.diagnosis.cluster_test import significance
 from scara_ident.diagnosis.effect_parameters import Coefficients, physical_parameters, told_size
 from scara_ident.diagnosis.moments import examine_moments
 from scara_ident.diagnosis.noise_check import BY_NOISE, made_by_noise, noise_objection, within_a_step
 from scara_ident.diagnosis.remainder_check import remainder_objection
+from scara_ident.diagnosis.same_errors import same
 from scara_ident.diagnosis.search import Search
 from scara_ident.diagnosis.selection_step import SelectionStep, best_of_each
 from scara_ident.diagnosis.variation_check import variation_objection
@@ -136,6 +138,42 @@ def outdone(found: Search, weights: Array, refused: Sequence[Decision]) -> list[
     return result
 
 
+def beaten_by_its_like(found: Search, weights: Array) -> list[Decision]:
+    """Return the decisions on effects in whose place the same of another joint explains more by more than chance, with why.
+
+    Of those that act together one stands for another, and a search believes the one that its tests let in, by however little.
+    Coarse fits hardly tell them apart, so that all are fitted to the end here.
+
+    Parameters
+    ----------
+    weights : ndarray, shape (n,)
+        See `unsettled`.
+    """
+    step, criteria = replace(found.step, weights=weights), found.step.criteria
+    labels = {item.label(step.scene) for item in step.chosen}
+    result = []
+    for place, candidate in enumerate(step.chosen):
+        alike = [
+            item.candidate
+            for item in found.decisions
+            if item.candidate.effect == candidate.effect and item.label not in labels
+        ]
+        if not candidate.effect.together or not alike:
+            continue
+        beside = step.without(place)
+        own, *others = beside.judge([candidate, *alike])
+        enough = criteria.near_confounder * own.examination.held_out
+        near = [item for item in best_of_each(others).values() if item.examination.held_out > enough]
+        near.sort(key=lambda item: -item.examination.held_out)
+        for item in near[: criteria.most_fitted]:
+            rival, decision = fitted_with(beside, item.candidate)
+            less = float(np.sum(own.examination.left) - np.sum(decision.examination.left))
+            if less > 0.0 and not same((beside, own), (rival, decision)):
+                result.append(own.refused(f"{item.label} explains more in its place"))
+                break
+    return result
+
+
 def beaten_by_impossible(found: Search, weights: Array) -> list[Decision]:
     """Return the decisions on effects in whose place one that no arm has explains more, with why.
 
@@ -184,7 +222,8 @@ def left_open(found: Search, weights: Array, demoted: Sequence[Decision] = ()) -
     """Return the decisions on what is not believed, though it is no noise, with that in words.
 
     Beside the effects found it would remove as much as is asked and is worth a look, and neither the noise of the positions
-    makes it nor what runs were seen to differ by: what is left is not shown to be noise, whatever it looks like.
+    makes it nor what runs were seen to differ by, nor what may be left of a correction of the data: what is left is not shown to be
+    noise, whatever it looks like.
 
     Parameters
     ----------
@@ -207,7 +246,7 @@ def left_open(found: Search, weights: Array, demoted: Sequence[Decision] = ()) -
         p_value = item.examination.p_value * found.tried
         if p_value > step.criteria.significant:
             continue
-        if within_a_step(step, item.candidate) or made_by_noise(step, item):
+        if within_a_step(step, item.candidate) or made_by_noise(step, item) or remainder_objection(step, item):
             continue
         if not (differing and variation_objection(step, item)):
             result.append(

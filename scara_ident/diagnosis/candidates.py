@@ -375,7 +375,8 @@ def _key(scene: Scene, candidate: Candidate) -> Key:
     loaded = effect.geared_joint(member) is not None
     on_links = scene.link_torques if loaded else ()
     # The only one in the model acts as it does beside it.
-    alone = not effect.together or set(scene.together) <= {(effect, member)}
+    follows = effect.together or effect.beside_together
+    alone = not follows or set(scene.together) <= {(effect, member)}
     together = () if alone else scene.together
     return effect, member, _estimate(scene, on_links, together)
 

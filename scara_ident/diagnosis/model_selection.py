@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from scara_ident.diagnosis.acceptance import Decision, hopeless
-from scara_ident.diagnosis.audit import beaten_by_impossible, outdone, superfluous, unsettled
+from scara_ident.diagnosis.audit import beaten_by_impossible, beaten_by_its_like, outdone, superfluous, unsettled
 from scara_ident.diagnosis.candidates import Candidate, CandidateColumns
 from scara_ident.diagnosis.choice import fitted_beside, more_than_chance
 from scara_ident.diagnosis.criteria import SelectionCriteria
@@ -214,5 +214,6 @@ def _unstable(found: Outcome, demoted: Sequence[Decision]) -> list[Decision]:
         *unsettled(search, weights),
         *superfluous(search, weights, found.hinted),
         *beaten_by_impossible(search, weights),
+        *beaten_by_its_like(search, weights),
         *outdone(search, weights, demoted),
     ]

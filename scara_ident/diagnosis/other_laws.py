@@ -1,9 +1,13 @@
-"""What the parameters of an effect owe to the fit that they are of: another law or minimum may explain as much with others."""
+"""What the parameters of an effect owe to the fit that they are of: another law or minimum may explain as much with others.
+
+What is left of a correction of the data may explain more.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +24,7 @@ def parameters_of_laws(step: SelectionStep) -> PhysicalParameters:
 
     Where another law of an effect explains as much, its parameters by that one are as good: what they differ by is one
     more standard deviation, and so it is of all parameters beside it. So it is with other fits of effects that act together,
-    see `as_good`. An effect by another law than that of its name has what tells the law among its parameters.
+    see `as_good`, and with what may be left of a correction of the data in the model. An effect by another law than that of its name has what tells the law among its parameters.
     """
     own = physical_parameters(step)
     effects, linear = list(own.effects), own.linear
@@ -31,7 +35,7 @@ def parameters_of_laws(step: SelectionStep) -> PhysicalParameters:
             told = physical_parameters(other)
             effects = [widened(each, its) for each, its in zip(effects, told.effects, strict=True)]
             linear = _apart(linear, told, np.arange(len(linear.value)))
-    for other in as_good(step):
+    for other in chain(as_good(step), _beside_rest(step)):
         told = physical_parameters(other)
         # What other rows say of the base model is less, and no other fit of these.
         same_rows = other.columns is step.columns
@@ -69,6 +73,12 @@ def _places(step: SelectionStep, own: PhysicalParameters) -> NDArray[np.intp]:
         if item.effect.together
     ]
     return np.concatenate(ranges)
+
+
+def _beside_rest(step: SelectionStep) -> Iterator[SelectionStep]:
+    """Give the model with what may be left of a correction, which is in all recordings and in no parameter of an arm."""
+    if step.rest is not None:
+        yield tune(replace(step, chosen=(*step.chosen, step.rest)))
 
 
 def _as_good(step: SelectionStep, place: int) -> Iterator[SelectionStep]:

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from scara_ident.diagnosis.acceptance import Decision
+from scara_ident.diagnosis.nonlinear_fit import tune
 from scara_ident.diagnosis.selection_step import SelectionStep
 
 
@@ -25,15 +26,19 @@ def remainder_objection(step: SelectionStep, decision: Decision) -> str | None:
     """
     if step.rest is None or decision.candidate.corrects_data:
         return None
-    own, rest = step.judge([decision.candidate, step.rest])
-    beside = replace(step, chosen=(*step.chosen, step.rest))
-    (again,) = beside.judge([decision.candidate])
-    left = again.examination.held_out * float(np.sum(beside.model.squares))
-    share = left / (own.examination.held_out * float(np.sum(step.model.squares)))
+    # Others in the model were fitted with the effect: what they took up of the rest shows once they are fitted without it, or with that.
+    without = tune(step)
+    rest = tune(replace(step, chosen=(*step.chosen, step.rest)))
+    both = tune(replace(rest, chosen=(*rest.chosen, decision.candidate)))
+    before, own, left = (
+        float(np.sum(each)) for each in (without.model.squares, decision.examination.left, rest.model.squares)
+    )
+    share = (left - float(np.sum(both.model.squares))) / (before - own) if own < before else 0.0
     # What has nothing to do with it removes as much with it as without.
     if share >= step.criteria.least_beside_rest:
         return None
     what = step.rest.effect.description(step.scene, step.rest.member)
-    if rest.examination.held_out >= step.criteria.least_share * own.examination.held_out:
+    if before - left >= step.criteria.least_share * (before - own):
         return f"{what} does as well in its place, and beside it {max(share, 0.0):.0%} of this is left"
+    (again,) = both.without(len(rest.chosen)).judge(both.chosen[-1:])
     return None if again.accepted else f"beside {what} {max(share, 0.0):.0%} of this is left: {again.why}"

@@ -71,9 +71,9 @@ class Effect(ABC):
         Whether the columns are a function of the load that a gear transmits, and are made again beside an effect that acts on links.
     fitted_first : bool
         Whether it is judged at the estimate fitted with it only: its columns at the estimate without it are poor ones.
-    together : bool
-        Whether what its members do follows from those of other joints in the model too, `Scene.together`: the columns of members
-        that are in it add up to what all of them do, those of another are what it changes beside them.
+    together, beside_together : bool
+        Whether what its members do follows from those of other joints in the model too, `Scene.together`: the columns of members in
+        it add up to what all of them do, those of another are what it changes beside them; or its columns do, and it is none of these.
     by_recording, in_intervals : bool
         Whether it acts in some recordings and not in others, see `in_recordings`, or in intervals that its member holds.
     of_each_recording : bool
@@ -112,6 +112,7 @@ class Effect(ABC):
     of_load: ClassVar[bool] = False
     fitted_first: ClassVar[bool] = False
     together: ClassVar[bool] = False
+    beside_together: ClassVar[bool] = False
     by_recording: ClassVar[bool] = False
     in_intervals: ClassVar[bool] = False
     of_each_recording: ClassVar[bool] = False
@@ -210,10 +211,9 @@ class Effect(ABC):
         found: dict[str, Any] = {"joint": "all joints"}
         found |= {item.name: value for item, value in zip(self.nonlinear, member.nonlinear, strict=True)}
         if member.joint is not None:
-            unit = robot.torque_unit(member.joint)
             found |= {
                 "joint": robot.joints[member.joint],
-                "torque": unit,
+                "torque": robot.torque_unit(member.joint),
                 "position": robot.position_unit(member.joint),
             }
             if member.partner is not None:

@@ -14,16 +14,15 @@ from scara_ident.effects.effect import DOUBT_STDS, Effect
 from scara_ident.effects.following import EstimateSlopes, predicted_slopes
 from scara_ident.effects.links import shared
 from scara_ident.effects.parameters import Coefficient, Member, Parameter, View, deviation
+from scara_ident.effects.position_filter import FILTERED, PositionFilter
 from scara_ident.effects.scale_groups import scale_groups
 from scara_ident.effects.signals import Scene, Signals
-from scara_ident.motion.low_pass import HIGHEST_CUT, differentiate
+from scara_ident.motion.low_pass import differentiate
 from scara_ident.motion.motion import UNIFORM_TOLERANCE
 from scara_ident.motion.spline import cubic_spline
 from scara_ident.recording.audit.samples import GAP_STEPS
 from scara_ident.recording.recording import Recording
 
-# The derivative of the predicted torque keeps this many times the band, so that the band itself is left alone.
-DERIVATIVE_BAND = 3.0
 # No controller lives with a longer lag than this many seconds.
 LONGEST_DELAY = 0.05
 # It may have this many samples where those last longer: a slow log is late by whole samples.
@@ -34,10 +33,6 @@ LARGEST_MISMATCH = 2.0
 MOST_TO_DOUBT = 2
 # Torque that is held from one sample to the next, or averaged over one, is up to this many samples off its time stamp.
 SAMPLING = 1.0
-# Of positions that are late by T seconds, motion up to this over T, Hz, is known where a filter makes them late: a mean over 2 T or a lag
-# of first order leaves 86 or 73 % of it, and the derivatives of `PositionFilter` all of the torque but 0.2 or 2 %. Of a fifth over T they leave 1
-# and 10 %, for which gears of single joints may stand.
-FILTERED = 0.15
 # Data are corrected until a further delay is below this, s.
 DELAY_STEP = 2e-5
 
@@ -279,38 +274,6 @@ class TimeDelay(Effect):
         return PositionFilter(), Member(None), FILTERED / -float(value[0])
 
 
-class PositionFilter(Effect):
-    """Positions of all joints behind one filter of their own, beside the delay that it is to first order.
-
-    It is no part of an arm and in no catalogue: an elastic gear of a joint, whose link lags by its load, does to the torque
-    what a filter does by all loads. A filter that keeps what rests is ``exp(-s T) (1 + c s^2 + d s^3 + ...)``, and
-    the torque, moved by T, is that of ``(1 - c s^2 - d s^3 - ...) q``: ``-c`` times the second derivative of the bodies' torque and so
-    on, as far as inertias stay what they are meanwhile. A mean over L has ``c = L^2/24``, a lag of first order
-    ``T^2/2`` and ``d = -T^3/3``, a Butterworth filter of second order no c. The first derivative is what the delay is off by.
-    """
-
-    name = "position_filter"
-    summary = "a filter of all positions before they were recorded"
-    coefficients = tuple(
-        Coefficient(f"order_{k}", unit, f"derivative {k} of the bodies' torque")
-        for k, unit in enumerate(("s", "s^2", "s^3", "s^4"), start=1)
-    )
-    all_joints = True
-    follows_estimate = True
-    not_simulated = "it is no part of an arm"
-
-    def members(self, scene: Scene) -> tuple[Member, ...]:
-        """Return that of all joints."""
-        return (Member(None),)
-
-    def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
-        """Return the first four derivatives of the bodies' torque."""
-        rate, band = signals.motion.rate, DERIVATIVE_BAND * signals.scene.band
-        cut = band if band < HIGHEST_CUT * rate else None
-        _, first, second = differentiate(signals.rigid, rate, cut)
-        return [first, second, *differentiate(second, rate, cut)[1:]]
-
-
 class LateTurn(Effect):
     """Coulomb friction of a joint that jumps later than the filtered velocity turns.
 
@@ -333,8 +296,7 @@ class LateTurn(Effect):
 
 def lacking(signals: Signals, torque: Array) -> Array:
     """Return what a torque (k, N) lacks for each second that it is late, ``-du/dt``."""
-    rate, band = signals.motion.rate, DERIVATIVE_BAND * signals.scene.band
-    return -differentiate(torque, rate, band if band < HIGHEST_CUT * rate else None)[1]
+    return -differentiate(torque, signals.motion.rate, signals.derivative_cut)[1]
 
 
 def shifted(recording: Recording, delay: float, joints: Sequence[int] | None = None) -> Recording:

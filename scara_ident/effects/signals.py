@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.model.model import TorqueModel
-from scara_ident.motion.low_pass import low_pass
+from scara_ident.motion.low_pass import HIGHEST_CUT, low_pass
 from scara_ident.motion.motion import Motion
 from scara_ident.robot.robot import Robot
 
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 # Share of its range that a joint must travel at the least for its travel to say anything of it.
 SMALLEST_TRAVEL = 1e-3
+# The derivative of a torque keeps this many times the band, so that the band itself is left alone.
+DERIVATIVE_BAND = 3.0
 
 
 @dataclass(frozen=True)
@@ -195,6 +197,22 @@ class Signals:
         for item in self.scene.link_torques:
             found += item.effect.torque_on_links(self, item.member, np.array(item.value))
         return found
+
+    @property
+    def of_together(self) -> Array:
+        """Torque of the effects in the model whose members act together, recorded side, shape (n, N)."""
+        found = np.zeros_like(self.motion.q)
+        for effect, member in self.scene.together:
+            tie = effect.tie(self.scene, member)
+            if tie is not None:
+                found += tie.value * effect.regressor(self, member)[:, 0]
+        return found
+
+    @property
+    def derivative_cut(self) -> float | None:
+        """Low-pass of the derivatives of a torque, Hz; None where the samples have nothing above it."""
+        band = DERIVATIVE_BAND * self.scene.band
+        return band if band < HIGHEST_CUT * self.motion.rate else None
 
     def load(self, joint: int) -> Array:
         """Torque that the gear of a joint transmits, recorded side, shape (N,).

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,8 @@ from numpy.typing import NDArray
 from scara_ident.effects import Coefficient, Effect, Member, Scene, Signals
 from scara_ident.effects.catalogue import CATALOGUE
 from scara_ident.effects.following import EstimateSlopes, predicted_slopes, slopes_by_differences, some_slopes
-from scara_ident.effects.measurement import PositionFilter, TorqueGainMismatch
+from scara_ident.effects.measurement import TorqueGainMismatch
+from scara_ident.effects.position_filter import PositionFilter
 from scara_ident.robot.robot import Robot, load_robot
 from tests.arms import example_urdf
 from tests.effects.scenes import moving, scene_of
@@ -77,14 +79,19 @@ def test_unless_a_family_says_them_differences_tell_the_derivatives() -> None:
     found = Squared().estimate_slopes(signals, Member(1), np.array([0.3]))
     exact = dense({1: (places, 0.6 * signals.predicted[1] * rows)}, signals)
     assert dense(found, signals) == pytest.approx(exact, rel=1e-6, abs=1e-9 * np.max(np.abs(exact)))
-    # Of all joints at once.
+
+
+def test_the_derivatives_of_all_joints_at_once_are_those_of_their_columns() -> None:
+    scene = scene_of(load_robot())
+    signals = Signals(scene, moving(scene.robot, 0.6))
     member, value = PositionFilter().members(scene)[0], np.array([1e-3, 1e-5, 0.0, 0.0])
-    told = dense(PositionFilter().estimate_slopes(signals, member, value), signals)
     columns = PositionFilter().regressor(signals.at(replace(scene, value=2.0 * scene.value)), member)
     once = PositionFilter().regressor(signals, member)
-    assert np.einsum("jpt,p->jt", told, scene.value) == pytest.approx(
-        np.einsum("jkt,k->jt", columns - once, value), abs=1e-6 * np.max(np.abs(once[:, 0]) * value[0])
-    )
+    for found in (PositionFilter().estimate_slopes, partial(slopes_by_differences, PositionFilter())):
+        told = dense(found(signals, member, value), signals)
+        assert np.einsum("jpt,p->jt", told, scene.value) == pytest.approx(
+            np.einsum("jkt,k->jt", columns - once, value), abs=1e-6 * np.max(np.abs(once[:, 0]) * value[0])
+        )
 
 
 def test_those_of_the_predicted_torque_are_the_base_models_columns() -> None:

@@ -10,12 +10,12 @@ import pytest
 from scara_ident.effects import Member, Signals
 from scara_ident.effects.measurement import (
     BentTorqueSensor,
-    PositionFilter,
     TimeDelay,
     TorqueGainMismatch,
     TorqueSensorNonlinearity,
     shifted,
 )
+from scara_ident.effects.position_filter import PositionFilter
 from scara_ident.model.model import build_model
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import load_robot
@@ -229,22 +229,6 @@ def test_a_delay_below_nothing_says_that_the_position_is_the_later_one():
     scene, delay = scene_of(load_robot()), TimeDelay()
     assert delay.or_else(scene, Member(None), np.array([0.005])) == ""
     assert "the position is the later one" in delay.or_else(scene, Member(None), np.array([-0.005]))
-
-
-def test_a_filter_of_the_positions_is_told_by_its_second_derivative():
-    """Of a mean over L, without its delay, the torque is that of the positions less L^2/24 of its second derivative."""
-    samples, made = 61, []
-    for item in recordings(lambda u, time: u, noise=1e-3):
-        # In the middle of the samples: no delay is left.
-        mean = np.array([np.convolve(row, np.full(samples, 1.0 / samples), "same") for row in item.position])
-        inside = slice(samples, -samples)
-        assert item.effort is not None
-        made.append(replace(item, time=item.time[inside], position=mean[:, inside], effort=item.effort[:, inside]))
-    _, value, covariance = fit(build_model(load_robot()), made, PositionFilter(), Member(None))
-    assert -value[1] == pytest.approx((samples / 500.0) ** 2 / 24.0, rel=0.1)
-    assert -value[1] > 5.0 * np.sqrt(covariance[1, 1])
-    # Less than half a sample.
-    assert abs(value[0]) < 1e-3
 
 
 def test_only_positions_that_are_late_by_more_than_a_sample_may_be_filtered():
