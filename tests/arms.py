@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from importlib.metadata import distribution
 from pathlib import Path
 
@@ -16,6 +17,12 @@ from scara_ident.recording.recording import Recording, split_name
 from scara_ident.robot.robot import Robot, load_robot
 
 Array = NDArray[np.float64]
+
+
+@cache
+def ur5() -> Robot:
+    """The UR5, loaded once: its base parameters and its regressor's arithmetic, which belong to a `Robot`, are found once too."""
+    return load_robot("ur5")
 
 
 @dataclass(frozen=True)

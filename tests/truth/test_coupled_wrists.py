@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from scara_ident.diagnosis.diagnose import diagnose
-from scara_ident.robot.robot import load_robot
+from tests.arms import ur5
 from tests.truth.scenes import Array, formula_run
 
 pytestmark = pytest.mark.slow
@@ -18,7 +18,7 @@ SHAFT = {"inertia": 0.08, "viscous": 0.6, "coulomb": 0.7}
 @pytest.mark.slow
 def test_a_shaft_through_two_wrists_is_found_with_its_three_parameters():
     """Before there was such an effect two couplings of friction and one of inertia were named."""
-    robot = load_robot("ur5")
+    robot = ur5()
     places = [robot.joints.index(name) for name in WRISTS]
     side = -1.0
     arms = np.array([[1.0], [side]])

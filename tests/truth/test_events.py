@@ -9,13 +9,13 @@ from scara_ident.diagnosis.diagnose import diagnose
 from scara_ident.identification.identify import identify
 from scara_ident.recording.recording import Recording
 from scara_ident.report.diagnosis import diagnosis_dict
-from scara_ident.robot.robot import load_robot
+from tests.arms import ur5
 from tests.truth.pushes import pushed
 from tests.truth.scenes import formula_run
 
 pytestmark = pytest.mark.slow
 
-ROBOT = load_robot("ur5")
+ROBOT = ur5()
 # 7 to 27 N m on the first joint.
 PUSHES = (("run1", 4.0, 5.5, (25.0, 20.0, 0.0)), ("run3", 7.0, 7.8, (-30.0, 25.0, 10.0)))
 

@@ -32,12 +32,12 @@ from scara_ident.use.check import Check, check
 from scara_ident.use.contact import ContactFindings, look_for_contact
 from scara_ident.use.joint_limits import joint_limits
 from scara_ident.use.observer import contact_observer
-from tests.arms import noisy, recorded_torque, recording, sines
+from tests.arms import noisy, recorded_torque, recording, sines, ur5
 from tests.report.html.made_fleet import made_fleet
 from tests.report.simulated import made, run, swinging
 from tests.report.test_use import result as used
 from tests.shared import PATIENCE
-from tests.use.quiet import known_ur5, pushed, quiet, ur5
+from tests.use.quiet import known_ur5, pushed, quiet
 
 
 @pytest.fixture(scope="session")
