@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -20,13 +23,14 @@ ROBOT = ur5()
 PUSHES = (("run1", 4.0, 5.5, (25.0, 20.0, 0.0)), ("run3", 7.0, 7.8, (-30.0, 25.0, 10.0)))
 
 
-def runs(count: int) -> list[Recording]:
-    return [
-        formula_run(ROBOT, f"run{k}", [43, k], seconds=14.0, rate=125.0, bits=20, noise=0.012) for k in range(count)
-    ]
+@cache
+def runs(count: int) -> tuple[Recording, ...]:
+    return tuple(
+        formula_run(ROBOT, f"run{k}", [43, k], seconds=10.0, rate=125.0, bits=20, noise=0.012) for k in range(count)
+    )
 
 
-def with_pushes(recordings: list[Recording]) -> list[Recording]:
+def with_pushes(recordings: Sequence[Recording]) -> list[Recording]:
     done = {name: (np.array(force), start, stop) for name, start, stop, force in PUSHES}
     return [pushed(ROBOT, run, *done[run.name]) if run.name in done else run for run in recordings]
 
