@@ -13,11 +13,12 @@ from scara_ident.asking import Asked, Settings, ask, key_of, read_asked, still_o
 from scara_ident.diagnosis.answerability import inquire
 from scara_ident.diagnosis.questions import Question, questions
 from scara_ident.errors import ScaraIdentError
-from scara_ident.excitation import Effort, limits_of, tell
+from scara_ident.excitation import Effort, limits_of
 from scara_ident.excitation.promise import Shown, Told
 from scara_ident.recording.recording import write_recording
 from scara_ident.robot.robot import load_robot
 from tests.diagnosis.asked import PAIR, open_diagnosis, small_runs
+from tests.excitation.designs import hurry
 
 # All of the limits: so short a motion of so short a search tells too little within less.
 QUICK = Settings(
@@ -57,9 +58,7 @@ def test_a_killed_run_is_gone_on_with_and_a_second_one_touches_nothing(
     def killed(*_: object, **__: object) -> None:
         raise KilledError
 
-    # How good the motion is plays no part.
-    for name, fewer in (("DRAWN", 12), ("CHANGED", 15)):
-        monkeypatch.setattr(tell, name, fewer)
+    hurry(monkeypatch)
     for name in ("write_json", "design_excitation", "write_joint_trajectory", "_promised"):
         with monkeypatch.context() as patch:
             patch.setattr(asking, name, killed)

@@ -15,12 +15,13 @@ from scara_ident.effects.position import Spring
 from scara_ident.effects.tilt import BaseTilt
 from scara_ident.errors import ScaraIdentError, UsageError
 from scara_ident.estimation.observations import observe
-from scara_ident.excitation import Effort, design_excitation, excitation_dict, limits_of, tell
+from scara_ident.excitation import Effort, design_excitation, excitation_dict, limits_of
 from scara_ident.excitation.promise import told
 from scara_ident.identification.usable import usable_in_bands
 from scara_ident.simulation import ReferenceMotion
 from tests.diagnosis.asked import PAIR, open_diagnosis, recorded, small_runs
 from tests.diagnosis.made import BANDS
+from tests.excitation.designs import hurry
 
 EFFORT = Effort(starts=1, rounds=0, seed=2, processes=1)
 
@@ -90,8 +91,7 @@ def test_a_motion_for_what_may_be_below_the_limit_tells_of_what_nobody_thought_o
 
 
 def test_the_better_half_of_the_searches_goes_on_whatever_the_number_of_processes(asked, monkeypatch):
-    for name, fewer in (("DRAWN", 12), ("CHANGED", 15)):
-        monkeypatch.setattr(tell, name, fewer)
+    hurry(monkeypatch)
     inquiry, _ = asked
     model, said = inquiry.scene.model, []
     effort = Effort(starts=2, rounds=1, seed=3, processes=1)
