@@ -333,7 +333,7 @@ def test_parameters_are_in_pinocchios_order() -> None:
 
 
 def test_models_alike_have_one_kernel_and_others_their_own() -> None:
-    """A robot that came to a process with each piece of work had its kernel traced and checked anew."""
+    """A robot that was loaded again had its kernel traced and checked anew."""
     model, (q, v, a) = load("ur5"), states(load("ur5"), 5)
     kernel = build_kernel(model, range(20))
     heavier = model.copy()
