@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cache, lru_cache
 from importlib.metadata import distribution
 from pathlib import Path
 
@@ -16,6 +17,12 @@ from scara_ident.recording.recording import Recording, split_name
 from scara_ident.robot.robot import Robot, load_robot
 
 Array = NDArray[np.float64]
+
+
+@cache
+def ur5() -> Robot:
+    """The UR5, loaded once: its base parameters and its regressor's arithmetic, which belong to a `Robot`, are found once too."""
+    return load_robot("ur5")
 
 
 @dataclass(frozen=True)
@@ -161,6 +168,7 @@ def motion(q: Array, v: Array, a: Array, rate: float = 1000.0, torque: Array | N
 SWING_FRICTION = ((0.4, 0.3, 0.0, 0.0, 0.1), (0.2, 0.1, 0.0, 0.0, -0.05))
 
 
+@lru_cache(maxsize=16)
 def swing(robot: Robot, name: str = "swing_1", seed: int = 0, seconds: float = 12.0, rate: float = 500.0) -> Recording:
     """Sums of sines of an arm of one or two joints, with Coulomb and viscous friction and an offset, without noise."""
     time = np.arange(round(seconds * rate)) / rate

@@ -18,6 +18,7 @@ from scara_ident.excitation.promise import Shown, Told
 from scara_ident.recording.recording import write_recording
 from scara_ident.robot.robot import load_robot
 from tests.diagnosis.asked import PAIR, open_diagnosis, small_runs
+from tests.excitation.designs import hurry
 
 # All of the limits: so short a motion of so short a search tells too little within less.
 QUICK = Settings(
@@ -57,6 +58,7 @@ def test_a_killed_run_is_gone_on_with_and_a_second_one_touches_nothing(
     def killed(*_: object, **__: object) -> None:
         raise KilledError
 
+    hurry(monkeypatch)
     for name in ("write_json", "design_excitation", "write_joint_trajectory", "_promised"):
         with monkeypatch.context() as patch:
             patch.setattr(asking, name, killed)

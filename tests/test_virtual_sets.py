@@ -15,7 +15,7 @@ from scara_ident.errors import UsageError
 from scara_ident.recording.recording import read_recordings
 from scara_ident.robot.robot import load_robot
 from scara_ident.simulation import virtual_arm
-from tests.arms import Link, write_urdf
+from tests.arms import Link, ur5, write_urdf
 
 pytestmark = pytest.mark.slow
 
@@ -157,7 +157,7 @@ def test_the_torque_of_an_event_is_what_the_closed_loop_gives(sets: ModuleType, 
     from scara_ident.simulation import ideal, simulate
     from tests.simulation.made import left_over, swing
 
-    arm = ideal(virtual_arm(load_robot("ur5")))
+    arm = ideal(virtual_arm(ur5()))
     rng = np.random.default_rng(5)
     motion = swing(arm.robot, 4.0, 0.2)
     kinds = set()

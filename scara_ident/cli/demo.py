@@ -30,6 +30,8 @@ PARTS = (
 )
 # Days on which each of the fleet's arms is recorded; from the last on one of them has what the first arm has.
 ARMS, DAYS, CHANGED = ("arm1", "arm2", "arm3"), ("2026-03-01", "2026-03-08"), "arm2"
+# Samples per second of a fleet's recordings: what watches many arms for long keeps no more.
+FLEET_RATE = 250.0
 
 
 def demo(
@@ -104,5 +106,5 @@ def _record_fleet(folder: Path, seed: int) -> None:
         for k, day in enumerate(DAYS):
             effects = [loss] if name == CHANGED and day == DAYS[-1] else []
             for motion in motions:
-                done = simulate(arm, motion, effects=effects, seed=100 * seed + 10 * place + k)
+                done = simulate(arm, motion, effects=effects, rate=FLEET_RATE, seed=100 * seed + 10 * place + k)
                 write_simulation(done, folder / name / day)

@@ -8,6 +8,7 @@ import signal
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import cache
 from io import TextIOWrapper
 from threading import current_thread, main_thread
 from typing import Annotated, Any, NoReturn
@@ -96,11 +97,17 @@ def main(arguments: list[str] | None = None) -> None:
     sys.exit(run(sys.argv[1:] if arguments is None else arguments))
 
 
+@cache
+def _commands() -> Callable[..., Any]:
+    """Return the commands with their options, which to read off all functions takes longer than many a command."""
+    return typer.main.get_command(app)
+
+
 def run(arguments: list[str]) -> int:
     """Run the program and return its exit status: 0 done, 1 cannot be given, 2 bad usage."""
     try:
         with plugin_notices(), _ended_tidily():
-            result = app(args=arguments, prog_name="scara-ident", standalone_mode=False)
+            result = _commands()(args=arguments, prog_name="scara-ident", standalone_mode=False)
         status = int(result) if isinstance(result, int) else 0
         if status == INTERRUPTED:
             _complain("interrupted; no file is left half-written")

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from scara_ident.arrays import NORMAL_MEDIAN, Array
+from scara_ident.arrays import NORMAL_MEDIAN, Array, median
 from scara_ident.effects import Scene
 from scara_ident.estimation.information import UNDETERMINED, orthonormal, triangular
 from scara_ident.fleet.causes import RUN_KINDS, Cause, causes_of, run_directions
@@ -208,9 +208,9 @@ def beyond_noise(steps: Array, noise: Array) -> Array:
     for k in range(steps.shape[1]):
         own, var = steps[known[:, k], k], noise[known[:, k], k]
         if len(own):
-            size = np.median(np.abs(own)) / NORMAL_MEDIAN
+            size = median(np.abs(own)) / NORMAL_MEDIAN
             kept = own[np.abs(own) <= CUT * size]
-            found[k] = 0.5 * float(np.mean(kept**2) / LEFT - np.median(var))
+            found[k] = 0.5 * float(np.mean(kept**2) / LEFT - median(var))
     return found
 
 

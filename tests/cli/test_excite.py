@@ -16,6 +16,7 @@ from scara_ident.recording.recording import write_recording
 from scara_ident.report.diagnosis import diagnosis_dict
 from scara_ident.robot.robot import embedded_urdf
 from tests.diagnosis.asked import PAIR, open_diagnosis, small_runs
+from tests.excitation.designs import hurry
 
 
 @pytest.mark.slow
@@ -116,7 +117,8 @@ def test_bad_usage_is_status_2(command, tmp_path: Path):
 
 
 @pytest.mark.slow
-def test_a_motion_is_designed_for_what_a_diagnosis_left_open(command, tmp_path: Path):
+def test_a_motion_is_designed_for_what_a_diagnosis_left_open(command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    hurry(monkeypatch)
     for item in small_runs():
         (tmp_path / "logs").mkdir(exist_ok=True)
         write_recording(item, tmp_path / "logs" / f"{item.name}.parquet")
@@ -132,8 +134,11 @@ def test_a_motion_is_designed_for_what_a_diagnosis_left_open(command, tmp_path: 
 
 
 @pytest.mark.slow
-def test_the_robot_is_that_of_the_diagnosis_where_none_is_given(command, tmp_path: Path):
+def test_the_robot_is_that_of_the_diagnosis_where_none_is_given(
+    command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
     """The embedded arm has the same name, and other limits."""
+    hurry(monkeypatch)
     slow = tmp_path / "slow.urdf"
     slow.write_text(re.sub(r'velocity="[^"]+"', 'velocity="0.5"', embedded_urdf().read_text()))
     content = diagnosis_dict(open_diagnosis())

@@ -70,7 +70,7 @@ def test_errors_are_one_line_and_a_status(
     def fails(**_: object) -> None:
         raise error
 
-    monkeypatch.setattr(sys.modules[run.__module__], "app", fails)
+    monkeypatch.setattr(sys.modules[run.__module__], "_commands", lambda: fails)
     assert run(["identify", "x"]) == status
     assert capfd.readouterr().err == said
 

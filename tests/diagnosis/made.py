@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import lru_cache
+from functools import cache, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -161,6 +161,7 @@ def runs_with_a_spring() -> list[Recording]:
     ]
 
 
+@cache
 def complete() -> TorqueModel:
     return build_model(load_robot(), "complete")
 

@@ -29,7 +29,7 @@ from scara_ident.model.model import build_model
 from scara_ident.robot.robot import load_robot
 from scara_ident.robot.rotors import GUESS_FACTOR
 from scara_ident.simulation import parse_effect, simulate, truth, virtual_arm
-from tests.arms import noisy, recorded_torque, recording, rnea, sines
+from tests.arms import noisy, recorded_torque, recording, rnea, sines, ur5
 from tests.diagnosis.made import NOISE, exact_runs, multisine, step_beside, with_torque
 from tests.effects.test_payload import laden
 
@@ -156,7 +156,7 @@ def test_without_effects_there_is_nothing_to_tune() -> None:
 
 def ur5_runs(armature: float):
     """Four motions of a UR5 with losses in its first two gears, friction, and rotors of which its URDF says nothing."""
-    robot = load_robot("ur5")
+    robot = ur5()
     rotors = np.array([armature, armature, 1.0, 0.1, 0.1, 0.1])[:, None]
     friction = np.array([8.0, 8.0, 6.0, 2.0, 2.0, 2.0])[:, None]
     loss = np.array(UR5_LOSS)[:, None]

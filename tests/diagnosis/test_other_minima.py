@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from dataclasses import replace
-from functools import lru_cache
+from functools import cache, lru_cache
 from types import SimpleNamespace
 
 import numpy as np
@@ -118,6 +118,8 @@ def test_what_differs_in_the_lower_part_of_the_band_is_in_the_standard_deviation
     softer = replace(step, chosen=(step.chosen[0], step.chosen[1].at((6.0, 0.03))))
     module = sys.modules[lowest.__module__]
     monkeypatch.setattr(module, "_rivals", lambda _: [])
+    # Of the same fits each time.
+    monkeypatch.setattr(sys.modules[parameters_of_laws.__module__], "physical_parameters", cache(physical_parameters))
     for below, far in ((softer, True), (step, False), (None, False)):
         monkeypatch.setattr(module, "_below", lambda _, below=below: below)
         told = parameters_of_laws(step).effects[1]["stiffness"]

@@ -15,7 +15,7 @@ from scara_ident.effects.payload import SHORTEST_ARM, PayloadChange, PayloadOfRe
 from scara_ident.model.base_parameters import size_of
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import load_robot
-from tests.arms import rnea
+from tests.arms import rnea, ur5
 from tests.effects.scenes import columns, moving, scene_of
 from tests.effects.test_payload import laden
 from tests.truth.scenes import formula_run, payload_torque
@@ -24,7 +24,7 @@ POINT = np.array([0.03, -0.02, 0.14])
 
 
 def test_its_column_is_the_torque_of_a_ball_where_it_sits():
-    robot = load_robot("ur5")
+    robot = ur5()
     item, scene = moving(robot, 1.0), scene_of(robot, start={"other": -1.0, "m": 0.0})
     body = PayloadOfRecordings().in_recordings(scene, Member(None), frozenset(["m"]))
     value = np.zeros(10)
@@ -47,7 +47,7 @@ def test_its_column_is_the_torque_of_a_ball_where_it_sits():
 
 
 def test_it_takes_the_place_of_a_body_mounted_anyhow_alone_and_where_torque_tells_where_it_sits():
-    scene = scene_of(load_robot("ur5"), start={"m": 0.0})
+    scene = scene_of(ur5(), start={"m": 0.0})
     member = Member(None, (), 1)
     for other in (PayloadChange(), CompactPayload(), PayloadOfRecordings(at_tool=True)):
         assert CompactPayload().in_place_of(scene, other, member, np.ones(10)) is None
@@ -63,7 +63,7 @@ def test_it_takes_the_place_of_a_body_mounted_anyhow_alone_and_where_torque_tell
 
 @pytest.fixture(scope="module")
 def runs() -> list[Recording]:
-    robot = load_robot("ur5")
+    robot = ur5()
     carried = payload_torque(robot, pin.Inertia(1.2, POINT, np.zeros((3, 3))))
     return [
         formula_run(robot, f"run_{k}", [31, k], seconds=10.0, rate=100.0, added=carried if k in (1, 2, 5) else None)
@@ -72,7 +72,7 @@ def runs() -> list[Recording]:
 
 
 def found_in(runs: list[Recording]) -> Diagnosis:
-    found = diagnose(load_robot("ur5"), runs[:5], validation=runs[5:], catalogue=effects_named("payload_change"))
+    found = diagnose(ur5(), runs[:5], validation=runs[5:], catalogue=effects_named("payload_change"))
     (effect,) = found.effects
     assert effect.description == "a payload in run_1, run_2, not in the others"
     told = {"mass": 1.2, **{f"com_{axis}": x for axis, x in zip("xyz", POINT, strict=True)}}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from scara_ident.effects import CATALOGUE, Effect, EffectTerm, SpectralLine
-from scara_ident.robot.robot import load_robot
+from tests.arms import ur5
 from tests.effects.scenes import scene_of
 
 pytestmark = pytest.mark.slow
@@ -18,7 +18,7 @@ MORE_THAN_A_STATE = {
 
 @pytest.mark.parametrize("effect", CATALOGUE, ids=lambda effect: type(effect).__name__)
 def test_effects_that_take_more_than_a_state_are_found_out(effect: Effect):
-    scene = scene_of(load_robot("ur5"), start={"m_1": 0.0, "m_2": 3.0})
+    scene = scene_of(ur5(), start={"m_1": 0.0, "m_2": 3.0})
     seeded = () if effect.seeded_by is None else effect.seeds(scene, 1, SpectralLine(effect.seeded_by, 3.0))
     members = [member for member in (*effect.members(scene), *seeded) if not effect.corrects_data(member)]
     for member in members[:6]:

@@ -18,7 +18,7 @@ from scara_ident.recording.recording import Recording
 from scara_ident.robot.description import RobotDescription
 from scara_ident.robot.robot import Robot, build_robot, load_robot
 from scara_ident.simulation import VirtualArm, parse_effect, sampled, simulate, virtual_arm
-from tests.arms import Array, example_urdf
+from tests.arms import Array, example_urdf, ur5
 from tests.effects.scenes import columns, dense, moving, scene_of
 
 
@@ -33,7 +33,7 @@ UPPER_ARM = ("shoulder_lift_joint", "elbow_joint")
 
 @pytest.mark.parametrize("offset", [1e-4, -0.3, 1.5707963, 3.0])
 def test_the_torque_is_that_at_the_true_position_whatever_the_offset(offset: float):
-    scene, item = scene_of(load_robot("ur5")), moving(load_robot("ur5"), 0.3)
+    scene, item = scene_of(ur5()), moving(ur5(), 0.3)
     there = moved_motion(item, 2, offset)
     expected = np.einsum("jpn,p->jn", scene.model.regressor(there), scene.value)
     expected -= np.einsum("jpn,p->jn", scene.model.regressor(item), scene.value)
@@ -43,7 +43,7 @@ def test_the_torque_is_that_at_the_true_position_whatever_the_offset(offset: flo
 
 
 def test_no_offset_is_the_derivative():
-    scene, item = scene_of(load_robot("ur5")), moving(load_robot("ur5"), 0.3)
+    scene, item = scene_of(ur5()), moving(ur5(), 0.3)
     step = 1e-4
     near = columns(JointZero(), scene, item, Member(3, (step,))) + columns(
         JointZero(), scene, item, Member(3, (-step,))
@@ -87,7 +87,7 @@ def test_members_are_the_joints_whose_zero_no_parameters_take_up(robot: str | No
 
 @pytest.mark.parametrize("offset", [0.0, 0.4])
 def test_it_is_in_the_code_of_an_export_whatever_the_offset(offset: float):
-    robot = load_robot("ur5")
+    robot = ur5()
     scene, item = scene_of(robot, name="basic"), moving(robot, 0.02)
     term = EffectTerm(JointZero(), Member(2, (offset,)), scene)
     model = TorqueModel("basic", robot, (*scene.model.terms, term))
@@ -102,7 +102,7 @@ def test_it_is_in_the_code_of_an_export_whatever_the_offset(offset: float):
 
 
 def test_the_line_that_mends_it_is_named():
-    scene = scene_of(load_robot("ur5"))
+    scene = scene_of(ur5())
     said = JointZero().or_else(scene, Member(2, (0.1,)), np.array([0.1]))
     assert "+0.1 rad (+5.73 deg)" in said
     assert "offset: {elbow_joint: ...}" in said

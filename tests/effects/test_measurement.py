@@ -19,7 +19,7 @@ from scara_ident.effects.position_filter import PositionFilter
 from scara_ident.model.model import build_model
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import load_robot
-from tests.arms import recorded_torque, recording, sines
+from tests.arms import recorded_torque, recording, sines, ur5
 from tests.effects.scenes import columns, fit, moving, scene_of
 
 FRICTION = ((0.1, 0.05, -0.004, 0.0, 0.02), (0.04, 0.03, 0.0, 0.0, -0.01))
@@ -61,7 +61,7 @@ def test_members_are_those_that_can_be_told():
 
 
 def test_of_more_than_two_joints_the_first_may_have_the_wrong_scale_too():
-    scene, effect = scene_of(load_robot("ur5")), TorqueGainMismatch()
+    scene, effect = scene_of(ur5()), TorqueGainMismatch()
     assert [member.joint for member in effect.members(scene)] == [0, 1, 2, 3, 4, 5]
     assert effect.told_beside(scene, Member(0)) is None
     assert effect.told_beside(scene, Member(4)) == Member(0)
@@ -72,7 +72,7 @@ def test_of_more_than_two_joints_the_first_may_have_the_wrong_scale_too():
 
 
 def test_the_ratio_is_to_the_first_joint_with_what_both_scales_are_uncertain_by():
-    scene, effect = scene_of(load_robot("ur5")), TorqueGainMismatch()
+    scene, effect = scene_of(ur5()), TorqueGainMismatch()
     value, covariance = np.array([-0.2, 0.25]), np.array([[4e-6, 1e-6], [1e-6, 9e-6]])
     found = effect.parameters(scene, Member(4), value, covariance)["ratio"]
     drawn = np.random.default_rng(0).multivariate_normal(1.0 + value, covariance, 100_000)

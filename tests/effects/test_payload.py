@@ -25,7 +25,7 @@ from scara_ident.effects.periodic import TorqueRipple
 from scara_ident.model.base_parameters import BODY_PARAMETERS
 from scara_ident.model.model import build_model
 from scara_ident.robot.robot import Robot, load_robot
-from tests.arms import PLANAR_2R, Link, example_urdf, recorded_torque, recording, rnea, sines, write_urdf
+from tests.arms import PLANAR_2R, Link, example_urdf, recorded_torque, recording, rnea, sines, ur5, write_urdf
 from tests.effects.intervals import RATE, arms, run, seen
 from tests.effects.scenes import columns, fit, moving, scene_of
 from tests.simulation.made import tree
@@ -88,7 +88,7 @@ def test_a_payload_mounted_anyhow_has_the_columns_that_its_torque_shows():
 
 
 def test_where_the_few_are_believed_all_columns_are_tried():
-    scene = scene_of(load_robot("ur5"))
+    scene = scene_of(ur5())
     few = FreePayloadChange()
     full = few.in_full()
     assert full is not None and full.in_full() is None

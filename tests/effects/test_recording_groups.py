@@ -16,7 +16,7 @@ from scara_ident.estimation.least_squares import wls
 from scara_ident.estimation.observations import observe
 from scara_ident.model.model import build_model
 from scara_ident.motion.prepared import prepare
-from scara_ident.robot.robot import load_robot
+from tests.arms import ur5
 from tests.truth.scenes import formula_run, payload_torque
 
 FIRST_MOMENTS = (0, 1, 2, 3)
@@ -26,7 +26,7 @@ HEAVY = pin.Inertia(1.5, np.array([0.05, -0.03, 0.1]), np.diag([0.004, 0.005, 0.
 
 def scene(carried: Sequence[pin.Inertia | None], noise: float = 0.02) -> Scene:
     """Recordings of a UR5, one for each payload."""
-    robot = load_robot("ur5")
+    robot = ur5()
     runs = [
         formula_run(
             robot, f"r_{k}", [3, k], seconds=10.0, rate=100.0, noise=noise,

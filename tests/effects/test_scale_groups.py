@@ -12,8 +12,8 @@ from scara_ident.effects import Member, effects_named
 from scara_ident.effects.measurement import TorqueGainMismatch
 from scara_ident.effects.scale_groups import scale_groups
 from scara_ident.model.model import build_model
-from scara_ident.robot.robot import Robot, load_robot
-from tests.arms import ALONG, CYLINDRICAL, PLANAR_2R, UP, Link, in_unit, recorded_torque, recording, sines
+from scara_ident.robot.robot import Robot
+from tests.arms import ALONG, CYLINDRICAL, PLANAR_2R, UP, Link, in_unit, recorded_torque, recording, sines, ur5
 from tests.effects.scenes import scene_of
 
 SLIDES = tuple(Link("prismatic", axis=axis, mass=5.0) for axis in (ALONG, (0.0, 1.0, 0.0), UP))
@@ -42,7 +42,7 @@ def test_joints_that_share_parameters_are_compared(links, groups, unit: float, t
 
 
 def test_all_joints_of_an_arm_in_space_are_compared():
-    term = build_model(load_robot("ur5")).rigid_body
+    term = build_model(ur5()).rigid_body
     assert scale_groups(term, (True,) * 6) == ((0, 1, 2, 3, 4, 5),)
     # One that rests says nothing of the others'.
     assert scale_groups(term, (False, True, True, False, False, False)) == ((0,), (1, 2), (3,), (4,), (5,))

@@ -18,7 +18,7 @@ from scara_ident.effects.parameters import Member
 from scara_ident.effects.two_mass import TwoMasses
 from scara_ident.motion.motion import Motion
 from scara_ident.robot.robot import Robot, load_robot
-from tests.arms import Array
+from tests.arms import Array, ur5
 from tests.effects.carried import carrying, heavier
 from tests.effects.scenes import dense, moving, scene_of
 
@@ -222,7 +222,7 @@ def test_what_members_share_goes_with_the_signals(frequency: float):
 
 
 def test_an_estimate_of_no_arm_lets_nothing_grow():
-    scene, item, _ = periodic(load_robot("ur5"), {0: 3000.0, 1: 3000.0})
+    scene, item, _ = periodic(ur5(), {0: 3000.0, 1: 3000.0})
     rng = np.random.default_rng(8)
     value = scene.value * (1.0 + rng.standard_normal(len(scene.value)))
     other = replace(scene, value=value)
@@ -294,7 +294,7 @@ def test_slopes_add_up_to_the_differences_of_what_all_links_do(recorded: bool):
 
 def test_a_link_that_lags_by_more_than_gears_give_has_no_elastic_gear():
     """A wrist of which an estimate leaves the weight and next to no inertia: at a low frequency its spring held nothing, and lags grew until they overflowed."""
-    robot = load_robot("ur5")
+    robot = ur5()
     scene, item = scene_of(robot), moving(robot)
     names, value = list(scene.model.names), scene.value.copy()
     value[names.index("mx6")] = 0.05
@@ -313,7 +313,7 @@ def test_a_link_that_lags_by_more_than_gears_give_has_no_elastic_gear():
 
 
 def test_what_a_swing_at_the_beginning_does_is_made_once_for_all_that_swing(monkeypatch):
-    scene, item, _ = periodic(load_robot("ur5"), {0: 3000.0, 1: 3000.0, 2: 3000.0})
+    scene, item, _ = periodic(ur5(), {0: 3000.0, 1: 3000.0, 2: 3000.0})
     members = members_with(scene, {0: 3000.0, 1: 3000.0, 2: 3000.0})
     scene = replace(scene, together=tuple((JointElasticity(), member) for member in members))
     signals, made, make = Signals(scene, item), [], TwoMasses._made_begun

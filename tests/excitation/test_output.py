@@ -24,6 +24,7 @@ from scara_ident.model.model import build_model
 from scara_ident.report.pictures import design_figures
 from scara_ident.robot.robot import load_robot
 from scara_ident.simulation import ReferenceMotion
+from tests.arms import ur5
 
 
 @pytest.fixture(scope="module")
@@ -66,7 +67,7 @@ def test_ros_2_gets_points_enough_for_a_fast_motion(made):
 
 def test_rotors_that_nobody_stated_are_named_with_what_they_would_make_of_a_torque():
     """They are most of what a geared joint moves: limits were said to hold with a third of the torque that was then asked for."""
-    model = build_model(load_robot("ur5"), "basic")
+    model = build_model(ur5(), "basic")
     effort = Effort(starts=1, rounds=0, processes=1)
     limits = limits_of(model.robot, clearance=None)
     made = design_excitation(model, duration=4.0, harmonics=3, samples=200, limits=limits, effort=effort)

@@ -21,6 +21,7 @@ from scara_ident.identification.usable import usable_in_bands
 from scara_ident.simulation import ReferenceMotion
 from tests.diagnosis.asked import PAIR, open_diagnosis, recorded, small_runs
 from tests.diagnosis.made import BANDS
+from tests.excitation.designs import hurry
 
 EFFORT = Effort(starts=1, rounds=0, seed=2, processes=1)
 
@@ -89,7 +90,8 @@ def test_a_motion_for_what_may_be_below_the_limit_tells_of_what_nobody_thought_o
     assert design.log_det > plain.log_det - 0.1 * len(model.names)
 
 
-def test_the_better_half_of_the_searches_goes_on_whatever_the_number_of_processes(asked):
+def test_the_better_half_of_the_searches_goes_on_whatever_the_number_of_processes(asked, monkeypatch):
+    hurry(monkeypatch)
     inquiry, _ = asked
     model, said = inquiry.scene.model, []
     effort = Effort(starts=2, rounds=1, seed=3, processes=1)

@@ -10,12 +10,12 @@ from scara_ident.identification.events import Event
 from scara_ident.identification.identify import identify
 from scara_ident.identification.recording_check import own_uncertainty, quiet_blocks, without_stretches
 from scara_ident.robot.robot import load_robot
-from tests.arms import PLANAR_2R, SWING_FRICTION, noisy, recorded_torque, recording, sines, write_urdf
+from tests.arms import PLANAR_2R, SWING_FRICTION, noisy, recorded_torque, recording, sines, ur5, write_urdf
 from tests.estimation.test_run_offsets import zeroed_runs
 from tests.truth.pushes import pushed
 from tests.truth.scenes import formula_run
 
-ROBOT = load_robot("ur5")
+ROBOT = ur5()
 
 
 def run(name: str, seed: int, payload: float = 0.0):

@@ -24,6 +24,7 @@ from scara_ident.model.model import TorqueModel, build_model
 from scara_ident.model.prediction import Prediction, states
 from scara_ident.model.terms.rigid_body import CHUNK
 from scara_ident.robot.robot import Robot, load_robot
+from tests.arms import ur5
 from tests.effects.scenes import scene_of
 from tests.export.arms import ARMS
 
@@ -66,7 +67,7 @@ def test_long_arrays_lists_and_copies_are_the_same():
 
 
 def test_threads_do_not_write_into_each_others_states():
-    model = build_model(load_robot("ur5"))
+    model = build_model(ur5())
     value, (q, v, a) = drawn(model, 400)
     found = Prediction(model, value)
     one_by_one = [found(*state).tolist() for state in zip(q, v, a, strict=True)]

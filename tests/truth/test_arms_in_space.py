@@ -30,7 +30,7 @@ def ur5(tmp_path_factory: pytest.TempPathFactory) -> Robot:
 
 def diagnosed(robot: Robot, bits: int, added: Added | None = None) -> Diagnosis:
     names = enumerate(("ma", "mb", "mc"))
-    runs = [formula_run(robot, name, [5, k], seconds=18.0, rate=100.0, bits=bits, added=added) for k, name in names]
+    runs = [formula_run(robot, name, [5, k], seconds=12.0, rate=100.0, bits=bits, added=added) for k, name in names]
     return diagnose(robot, runs)
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from scara_ident.diagnosis.diagnose import diagnose
 from scara_ident.effects import effects_named
-from scara_ident.robot.robot import load_robot
+from tests.arms import ur5
 from tests.truth.scenes import formula_run
 
 pytestmark = pytest.mark.slow
@@ -18,7 +18,7 @@ pytestmark = pytest.mark.slow
 @pytest.mark.parametrize("square", [0.001, -0.0007])
 def test_it_is_found_alone_and_leaves_gravity_as_it_is(square: float):
     """By a cube alone it came with a friction that depends on the position, and first moments ten standard deviations off."""
-    robot = load_robot("ur5")
+    robot = ur5()
     runs = [formula_run(robot, f"run{k}", [41, k], seconds=12.0, rate=100.0, bits=18) for k in range(3)]
     bent = []
     for run in runs:

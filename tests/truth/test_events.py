@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -9,24 +12,25 @@ from scara_ident.diagnosis.diagnose import diagnose
 from scara_ident.identification.identify import identify
 from scara_ident.recording.recording import Recording
 from scara_ident.report.diagnosis import diagnosis_dict
-from scara_ident.robot.robot import load_robot
+from tests.arms import ur5
 from tests.truth.pushes import pushed
 from tests.truth.scenes import formula_run
 
 pytestmark = pytest.mark.slow
 
-ROBOT = load_robot("ur5")
+ROBOT = ur5()
 # 7 to 27 N m on the first joint.
 PUSHES = (("run1", 4.0, 5.5, (25.0, 20.0, 0.0)), ("run3", 7.0, 7.8, (-30.0, 25.0, 10.0)))
 
 
-def runs(count: int) -> list[Recording]:
-    return [
-        formula_run(ROBOT, f"run{k}", [43, k], seconds=14.0, rate=125.0, bits=20, noise=0.012) for k in range(count)
-    ]
+@cache
+def runs(count: int) -> tuple[Recording, ...]:
+    return tuple(
+        formula_run(ROBOT, f"run{k}", [43, k], seconds=10.0, rate=125.0, bits=20, noise=0.012) for k in range(count)
+    )
 
 
-def with_pushes(recordings: list[Recording]) -> list[Recording]:
+def with_pushes(recordings: Sequence[Recording]) -> list[Recording]:
     done = {name: (np.array(force), start, stop) for name, start, stop, force in PUSHES}
     return [pushed(ROBOT, run, *done[run.name]) if run.name in done else run for run in recordings]
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from scara_ident.diagnosis.diagnose import diagnose
-from scara_ident.robot.robot import load_robot
+from tests.arms import ur5
 from tests.truth.scenes import Array, formula_run
 
 pytestmark = pytest.mark.slow
@@ -17,7 +17,7 @@ VISCOUS, COULOMB = 1.5, 2.0
 
 def test_coupled_wrists_are_found_in_one_noisy_run_of_45_s():
     """Commit a6cf3ca called it `complete`: with one degree of freedom left by 58 columns nothing was significant."""
-    robot = load_robot("ur5")
+    robot = ur5()
     places = [robot.joints.index(name) for name in WRISTS]
 
     def coupled(t: Array, q: Array, v: Array, a: Array, load: Array) -> Array:

@@ -16,7 +16,7 @@ from scara_ident.effects.payload import PayloadOfRecordings
 from scara_ident.estimation.least_squares import wls
 from scara_ident.estimation.observations import observe
 from scara_ident.motion.prepared import prepare
-from scara_ident.robot.robot import load_robot
+from tests.arms import ur5
 from tests.truth.scenes import formula_run, payload_torque
 
 pytestmark = pytest.mark.slow
@@ -27,7 +27,7 @@ PAYLOAD = pin.Inertia(1.2, np.array([0.08, -0.05, 0.12]), np.diag([0.004, 0.003,
 @pytest.mark.slow
 def test_a_payload_is_found_by_torque_and_told_in_recordings_held_out():
     """Before, groups were tried by names and order, and a payload was a point mass: a loaded recording held out stayed off."""
-    robot = load_robot("ur5")
+    robot = ur5()
     carried = payload_torque(robot, PAYLOAD)
     loaded = {1: carried, 2: carried, 5: carried}
     runs = [
@@ -64,7 +64,7 @@ def test_a_payload_is_found_by_torque_and_told_in_recordings_held_out():
 @pytest.mark.slow
 def test_of_a_body_taken_up_in_the_run_all_is_told_that_shows():
     """Before, its inertia was no column, and what that left was `unexplained`."""
-    robot = load_robot("ur5")
+    robot = ur5()
     carried = payload_torque(robot, PAYLOAD)
 
     def taken_up(t, *state):

@@ -11,7 +11,8 @@ import pytest
 from scara_ident.diagnosis.diagnose import Diagnosis, diagnose
 from scara_ident.effects import effects_named
 from scara_ident.recording.recording import Recording
-from scara_ident.robot.robot import Robot, load_robot
+from scara_ident.robot.robot import Robot
+from tests.arms import ur5
 from tests.truth.scenes import formula_run
 
 pytestmark = pytest.mark.slow
@@ -19,7 +20,7 @@ pytestmark = pytest.mark.slow
 
 @cache
 def exact_runs() -> tuple[Robot, tuple[Recording, ...]]:
-    robot = load_robot("ur5")
+    robot = ur5()
     runs = (formula_run(robot, f"run{k}", [31, k], seconds=12.0, rate=100.0, bits=18) for k in range(3))
     return robot, tuple(runs)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pinocchio as pin
@@ -12,17 +11,11 @@ from scara_ident.export.identified_model import IdentifiedModel
 from scara_ident.model.model import build_model
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.kinematics import tool_frame
-from scara_ident.robot.robot import Robot, load_robot
-from tests.arms import recorded_torque, recording, sines
+from tests.arms import recorded_torque, recording, sines, ur5
 from tests.use.made import known_as
 
 RATE, NOISE = 100.0, 0.5
 FRICTION = [(2.0, 1.0, 0.0, 0.0, 0.1)] * 6
-
-
-@cache
-def ur5() -> Robot:
-    return load_robot("ur5")
 
 
 def known_ur5() -> IdentifiedModel:

@@ -8,7 +8,8 @@ import pytest
 from scara_ident.robot.kinematics import tool_placement
 from scara_ident.use.contact import Contact, contacts_dict, look_for_contact
 from scara_ident.use.observer import ContactObserver, contact_observer
-from tests.use.quiet import known_ur5, pushed, quiet, ur5
+from tests.arms import ur5
+from tests.use.quiet import known_ur5, pushed, quiet
 
 FORCE = np.array([30.0, -20.0, 40.0])
 

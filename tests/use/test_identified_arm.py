@@ -15,7 +15,7 @@ from scara_ident.simulation import virtual_arm
 from scara_ident.simulation.inverse_dynamics import inverse_dynamics
 from scara_ident.simulation.truth import _complete_parameters
 from scara_ident.use.identified_arm import arm_with, arms_of, rotor_note, simulated
-from tests.arms import Link, write_urdf
+from tests.arms import Link, ur5, write_urdf
 from tests.use.made import known_as
 
 
@@ -50,7 +50,7 @@ def test_its_torque_is_the_models_on_any_motion(name: str, tmp_path: Path) -> No
 
 def test_bodies_without_mass_take_the_models_torque_too() -> None:
     """Of base parameters bodies of less than no mass may follow, as on a large arm seen by small motion."""
-    robot = load_robot("ur5")
+    robot = ur5()
     model, wanted = build_model(robot, "complete"), moved_values(robot)
     lighter = virtual_arm(robot).bodies.copy()
     lighter[3, :4] = -40.0, 3.0, -2.0, 1.0
@@ -66,7 +66,7 @@ def test_bodies_without_mass_take_the_models_torque_too() -> None:
 
 
 def test_an_arm_that_an_estimate_has_found_is_taken_as_it_is() -> None:
-    robot = load_robot("ur5")
+    robot = ur5()
     arm, random = virtual_arm(robot), np.random.default_rng(4)
     found = np.concatenate([arm.bodies.ravel(), arm.armature]) * random.uniform(0.5, 1.5, 11 * robot.n)
     body = build_model(robot, "complete").rigid_body

@@ -12,7 +12,7 @@ from scara_ident.export.identified_model import IdentifiedModel
 from scara_ident.model.model import build_model
 from scara_ident.robot.robot import load_robot
 from scara_ident.use.momentum import arm_momentum
-from tests.arms import motion
+from tests.arms import motion, ur5
 from tests.simulation.made import tree
 from tests.use.made import known_as
 
@@ -21,7 +21,7 @@ STEP = 1e-5
 
 @pytest.mark.parametrize("name", ["scara03", "ur5", "tree"])
 def test_it_is_that_of_the_model(name: str, tmp_path: Path):
-    robot = {"scara03": load_robot, "ur5": lambda: load_robot("ur5"), "tree": lambda: tree(tmp_path)}[name]()
+    robot = {"scara03": load_robot, "ur5": ur5, "tree": lambda: tree(tmp_path)}[name]()
     model = build_model(robot, "basic")
     body, rng = model.rigid_body, np.random.default_rng(1)
     value = np.zeros(len(model.columns))

@@ -12,6 +12,7 @@ from scara_ident.robot.robot import load_robot
 from scara_ident.simulation import virtual_arm
 from scara_ident.simulation.inverse_dynamics import inverse_dynamics
 from scara_ident.use.trial_motion import trial_motion
+from tests.arms import ur5
 
 
 @pytest.mark.parametrize("name", [None, "ur5"])
@@ -30,7 +31,7 @@ def test_it_keeps_the_limits_and_is_its_own_derivative(name: str | None) -> None
 
 
 def test_an_arm_that_cannot_hold_itself_is_refused() -> None:
-    arm = virtual_arm(load_robot("ur5"))
+    arm = virtual_arm(ur5())
     weak = replace(arm, robot=replace(arm.robot, effort_limit=np.full(6, 0.5)))
     with pytest.raises(RobotError, match="its weight alone exceeds the torque limits"):
         trial_motion(weak)

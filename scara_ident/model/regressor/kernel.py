@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 import pinocchio as pin
@@ -142,7 +143,7 @@ class RegressorKernel(Frozen):
 
 
 def build_kernel(model: pin.Model, columns: Sequence[int] | NDArray[np.intp] | None = None) -> RegressorKernel:
-    """Trace, emit and check the regressor of a model.
+    """Trace, emit and check the regressor of a model, once for all models of the same joints and gravity.
 
     Parameters
     ----------
@@ -164,8 +165,28 @@ def build_kernel(model: pin.Model, columns: Sequence[int] | NDArray[np.intp] | N
     ValueError
         There is no such column.
     """
-    kernel = _emit_kernel(joint_geometry(model), model.gravity, columns)
-    _check(kernel, model)
+    joints = joint_geometry(model)
+    parts = [(item.axis.tobytes(), item.rotation.tobytes(), item.offset.tobytes()) for item in joints]
+    rows = [(item.parent, item.velocity_index, item.prismatic) for item in joints]
+    wanted = np.arange(10 * len(joints)) if columns is None else np.array(columns, dtype=np.intp)
+    words = (*rows, *parts, model.gravity.vector.tobytes(), wanted.shape, wanted.tobytes())
+    return _checked_kernel(_Asked(words, model, tuple(joints), wanted))
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """A kernel of a model; `words` say all that it follows from, so that it is that of every model alike."""
+
+    words: tuple[object, ...]
+    model: pin.Model = field(compare=False)
+    joints: tuple[JointGeometry, ...] = field(compare=False)
+    columns: NDArray[np.intp] = field(compare=False)
+
+
+@lru_cache(maxsize=32)
+def _checked_kernel(asked: _Asked) -> RegressorKernel:
+    kernel = _emit_kernel(asked.joints, asked.model.gravity, asked.columns)
+    _check(kernel, asked.model)
     return kernel
 
 

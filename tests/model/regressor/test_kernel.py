@@ -330,3 +330,19 @@ def test_parameters_are_in_pinocchios_order() -> None:
     assert [named["mcx"], named["mcy"], named["mcz"]] == pytest.approx([0.2, 0.4, 0.6])
     for i, j, name in [(0, 0, "Ixx"), (0, 1, "Ixy"), (1, 1, "Iyy"), (0, 2, "Ixz"), (1, 2, "Iyz"), (2, 2, "Izz")]:
         assert named[name] == pytest.approx(about_origin[i, j])
+
+
+def test_models_alike_have_one_kernel_and_others_their_own() -> None:
+    """A robot that was loaded again had its kernel traced and checked anew."""
+    model, (q, v, a) = load("ur5"), states(load("ur5"), 5)
+    kernel = build_kernel(model, range(20))
+    heavier = model.copy()
+    heavier.inertias[1] = pin.Inertia.Random()
+    assert build_kernel(heavier, range(20)) is kernel
+    assert build_kernel(model, range(10, 30)) is not kernel
+    tilted, longer = model.copy(), model.copy()
+    tilted.gravity.linear = np.array([0.0, 1.0, -9.0])
+    longer.jointPlacements[3] = pin.SE3(np.eye(3), np.array([0.1, 0.2, 0.3]))
+    for other in (tilted, longer):
+        expected = regressor.pinocchio_regressor(other, q, v, a)[:, :20]
+        np.testing.assert_allclose(build_kernel(other, range(20))(q, v, a), expected, atol=1e-10)

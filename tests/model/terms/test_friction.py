@@ -15,7 +15,7 @@ from scara_ident.model.terms import Friction, Offset
 from scara_ident.model.terms.friction import offset
 from scara_ident.model.terms.rigid_body import rigid_body
 from scara_ident.robot.robot import Robot, load_robot
-from tests.arms import Link, motion, write_urdf
+from tests.arms import Link, motion, ur5, write_urdf
 from tests.excitation.made import scara_with_quill
 
 LINKS = (Link(), Link(kind="prismatic", axis=(1, 0, 0), xyz=(0.1, 0, 0)), Link(axis=(0, 1, 0)))
@@ -130,7 +130,7 @@ def test_an_axis_that_goes_up_and_down_has_no_offset_of_its_own(robot: Robot):
     # Across gravity, or without any, or turning, an axis has one.
     for gravity in ((0.0, -9.81, 0.0), (0.0, 0.0, 0.0)):
         assert constant_torques(scara_with_quill(gravity)) == ()
-    assert constant_torques(load_robot()) == constant_torques(load_robot("ur5")) == ()
+    assert constant_torques(load_robot()) == constant_torques(ur5()) == ()
 
 
 def whole_model(robot: Robot) -> TorqueModel:

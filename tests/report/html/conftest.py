@@ -32,12 +32,12 @@ from scara_ident.use.check import Check, check
 from scara_ident.use.contact import ContactFindings, look_for_contact
 from scara_ident.use.joint_limits import joint_limits
 from scara_ident.use.observer import contact_observer
-from tests.arms import noisy, recorded_torque, recording, sines
+from tests.arms import noisy, recorded_torque, recording, sines, ur5
 from tests.report.html.made_fleet import made_fleet
 from tests.report.simulated import made, run, swinging
 from tests.report.test_use import result as used
 from tests.shared import PATIENCE
-from tests.use.quiet import known_ur5, pushed, quiet, ur5
+from tests.use.quiet import known_ur5, pushed, quiet
 
 
 @pytest.fixture(scope="session")
@@ -231,28 +231,64 @@ def browser():
         program.close()
 
 
-@pytest.fixture
-def opened(browser):
-    """Open a page; at the end nothing may have been said on the console and nothing asked of a network."""
-    contexts, said, asked = [], [], []
+class Window:
+    """A page of the browser; what is said on its console and what it asks of a network."""
 
-    def open_(path: Path, **options):
-        context = browser.new_context(**{"viewport": {"width": 1180, "height": 900}, **options})
-        contexts.append(context)
+    def __init__(self, browser, options: dict) -> None:
+        context = browser.new_context(**options)
         context.set_default_timeout(1000.0 * PATIENCE)
-        page = context.new_page()
-        page.on("console", lambda message: said.append(message.text) if message.type in ("error", "warning") else None)
-        page.on("pageerror", lambda error: said.append(str(error)))
-        page.on("request", lambda request: asked.append(request.url))
-        page.goto(path.as_uri())
-        page.wait_for_selector("html[data-ready=true]")
-        return page
+        self.page, self.said, self.asked = context.new_page(), [], []
+        self.page.on(
+            "console", lambda message: self.said.append(message.text) if message.type in ("error", "warning") else None
+        )
+        self.page.on("pageerror", lambda error: self.said.append(str(error)))
+        self.page.on("request", lambda request: self.asked.append(request.url))
+
+    def load(self, path: Path) -> None:
+        self.page.mouse.move(0, 0)
+        self.page.goto(path.as_uri())
+        self.page.wait_for_selector("html[data-ready=true]")
+
+
+@pytest.fixture(scope="session")
+def windows(browser):
+    """A window for each choice of options: to begin one takes longer than to load another report into it."""
+    made: dict[str, Window] = {}
+
+    def window(options: dict) -> Window:
+        if repr(options) not in made:
+            made[repr(options)] = Window(browser, options)
+        return made[repr(options)]
+
+    yield window
+    for each in made.values():
+        each.page.context.close()
+
+
+@pytest.fixture
+def opened(browser, windows):
+    """Load a page; at the end nothing may have been said on the console and nothing asked of a network.
+
+    A test that changes more than the page, as size or colours, asks for a window of its own.
+    """
+    used, closed = [], []
+
+    def open_(path: Path, own: bool = False, **options):
+        options = {"viewport": {"width": 1180, "height": 900}, **options}
+        window = Window(browser, options) if own else windows(options)
+        used.append(window)
+        if own:
+            closed.append(window)
+        window.said.clear()
+        window.asked.clear()
+        window.load(path)
+        return window.page
 
     yield open_
-    for context in contexts:
-        context.close()
-    assert said == []
-    assert all(url.startswith(("file:", "data:")) for url in asked)
+    for window in closed:
+        window.page.context.close()
+    assert [words for window in used for words in window.said] == []
+    assert all(url.startswith(("file:", "data:")) for window in used for url in window.asked)
 
 
 # Figures without anything drawn in them, or with numbers that are none.

@@ -102,7 +102,7 @@ def test_buttons_and_keys_zoom_and_move(identified, opened):
 
 
 def test_the_pointer_reads_values(identified, opened):
-    page = opened(identified)
+    page = opened(identified, own=True)
     page.locator("[data-figure=torque]").scroll_into_view_if_needed()
     box = page.locator("[data-figure=torque] .plot").bounding_box()
     page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 60)
@@ -149,7 +149,7 @@ def test_ten_recordings_of_25_s_load_whole_and_keep_their_peak(big, opened):
 
 def test_dark_light_and_print_differ_in_colours_only(identified, opened):
     background = "getComputedStyle(document.body).backgroundColor"
-    page = opened(identified, color_scheme="light")
+    page = opened(identified, own=True, color_scheme="light")
     assert page.evaluate(background) == "rgb(255, 255, 255)"
     page.emulate_media(color_scheme="dark")
     assert page.evaluate(background) == "rgb(20, 23, 27)"
@@ -163,7 +163,7 @@ def test_dark_light_and_print_differ_in_colours_only(identified, opened):
 
 
 def test_all_sections_are_named_beside_the_button_whatever_the_width(diagnosed, opened):
-    page = opened(diagnosed, viewport={"width": 1920, "height": 900})
+    page = opened(diagnosed, own=True, viewport={"width": 1920, "height": 900})
     bar = page.locator("nav div")
     # As many as a page of all sections has.
     bar.evaluate("bar => { while (bar.children.length < 12) bar.prepend(bar.querySelector('a').cloneNode(true)); }")

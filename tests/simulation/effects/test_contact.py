@@ -9,9 +9,10 @@ import pinocchio as pin
 import pytest
 
 from scara_ident.errors import ScaraIdentError
-from scara_ident.robot.robot import Robot, load_robot
+from scara_ident.robot.robot import Robot
 from scara_ident.simulation import ideal, parse_effect, simulate, virtual_arm
 from scara_ident.simulation.spatial import configuration
+from tests.arms import ur5
 from tests.simulation.effects.runs import Array
 from tests.simulation.made import left_over, scara, swing
 
@@ -31,7 +32,7 @@ def pushed(robot: Robot, link: str, q: Array, force: Array) -> Array:
 
 @pytest.mark.parametrize("link", ["tool0", "forearm_link"])
 def test_the_drives_give_what_the_transposed_jacobian_asks_for(link: str) -> None:
-    arm = ideal(virtual_arm(load_robot("ur5")))
+    arm = ideal(virtual_arm(ur5()))
     effect = parse_effect(f"push:force=20,from=0.4,duration=0.5,direction=0/3/4,link={link}")
     motion = swing(arm.robot, 1.2, amplitude=0.2)
     result = simulate(arm, motion, effects=[effect])
@@ -63,7 +64,7 @@ def test_without_a_link_it_is_at_the_tool() -> None:
 
 
 def test_steps_of_half_the_length_give_the_same_motion() -> None:
-    arm = ideal(virtual_arm(load_robot("ur5")))
+    arm = ideal(virtual_arm(ur5()))
     effect = parse_effect("push:force=30,from=0.0505,duration=0.3,edge=0.01,direction=0/1/1")
     runs = [simulate(arm, swing(arm.robot, 0.5, 0.2), effects=[effect], substeps=k) for k in (4, 8, 64)]
     way = np.abs(runs[2].true.position - simulate(arm, swing(arm.robot, 0.5, 0.2), substeps=64).true.position).max()
@@ -94,7 +95,7 @@ def test_it_is_in_the_recording_that_is_named_only() -> None:
     ],
 )
 def test_a_push_that_cannot_be_is_one_line(text: str, said: str) -> None:
-    arm = replace(virtual_arm(load_robot("ur5")))
+    arm = replace(virtual_arm(ur5()))
     with pytest.raises(ScaraIdentError, match=said) as caught:
         simulate(arm, swing(arm.robot, 0.1, 0.1), effects=[parse_effect(text)])
     assert "\n" not in str(caught.value)

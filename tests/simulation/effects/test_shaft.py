@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 from scara_ident.errors import UsageError
-from scara_ident.robot.robot import load_robot
 from scara_ident.simulation import effects as fx
 from scara_ident.simulation import free_motion, ideal, on_side, parse_effect, simulate, virtual_arm
+from tests.arms import ur5
 from tests.simulation.made import bare, left_over, scara, swing
 from tests.simulation.test_integrate import energy
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_it_loads_both_joints_by_its_equation_and_no_other(sign: float) -> None:
-    arm = ideal(virtual_arm(load_robot("ur5")))
+    arm = ideal(virtual_arm(ur5()))
     effect = parse_effect(f"coupled_shaft:inertia=0.08,viscous=0.6,coulomb=0.7,sign={sign:g}").resolve(arm)
     assert (effect.joint, effect.other(arm)) == ("wrist_2_joint", "wrist_3_joint")
     true = simulate(arm, swing(arm.robot, 1.5, amplitude=0.3), effects=[effect]).true
@@ -66,7 +66,7 @@ def test_its_friction_takes_what_the_arm_loses() -> None:
 
 
 def test_steps_of_half_the_length_give_the_same_motion() -> None:
-    arm = ideal(virtual_arm(load_robot("ur5")))
+    arm = ideal(virtual_arm(ur5()))
     effect = parse_effect("coupled_shaft:inertia=0.08,viscous=0.6,coulomb=2")
     runs = [simulate(arm, swing(arm.robot, 0.8, 0.2), effects=[effect], substeps=k).true.position for k in (4, 8, 64)]
     plain = simulate(arm, swing(arm.robot, 0.8, 0.2)).true.position

@@ -12,6 +12,7 @@ from scara_ident.errors import UsageError
 from scara_ident.robot.robot import load_robot
 from scara_ident.simulation import VirtualArm, ideal, parse_effect, simulate, virtual_arm
 from scara_ident.simulation import effects as fx
+from tests.arms import ur5
 from tests.simulation.effects.runs import Array, run
 from tests.simulation.made import left_over, scara, swing
 
@@ -66,7 +67,7 @@ def test_a_payload_is_a_part_of_the_last_body_while_it_is_carried(name: str) -> 
 
 
 def test_a_run_that_starts_with_a_payload_starts_with_the_torque_that_holds_it() -> None:
-    arm = ideal(virtual_arm(load_robot("ur5")))
+    arm = ideal(virtual_arm(ur5()))
     motion = swing(arm.robot, 0.6, amplitude=0.2)
     plain, loaded = simulate(arm, motion), simulate(arm, motion, effects=[parse_effect(f"payload:{BOX}")])
     assert np.nanmax(np.abs(left_over(with_box(arm), loaded.true))) < 1e-9 * np.abs(loaded.true.effort).max()

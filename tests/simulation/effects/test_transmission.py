@@ -20,7 +20,7 @@ from scara_ident.simulation import (
     virtual_arm,
 )
 from scara_ident.simulation import effects as fx
-from tests.arms import example_urdf, rnea
+from tests.arms import example_urdf, rnea, ur5
 from tests.simulation.effects.runs import Array, assert_changes_by, load_at_motor, run
 from tests.simulation.made import friction, scara, swing
 
@@ -153,7 +153,7 @@ def test_steps_of_half_the_length_give_the_same_link(name: str, joint: int, stif
 
 @pytest.mark.parametrize("width", [0.0005, 0.005])
 def test_clearance_is_gone_through_on_a_six_axis_arm(width: float) -> None:
-    arm = ideal(virtual_arm(load_robot("ur5")))
+    arm = ideal(virtual_arm(ur5()))
     names = arm.robot.joints[0], arm.robot.joints[3]
     result = simulate(arm, swing(arm.robot, 2.0, 0.3), effects=[fx.Backlash(name, width) for name in names])
     for j in (0, 3):
