@@ -180,6 +180,23 @@ def beside_recordings(folder: Path) -> list[Path]:
     return sorted(path for path in folder.glob("*") if path.suffix.lower() in SUFFIXES and path.is_file())
 
 
+def told_so_far(folder: Path) -> str:
+    """Return in a line what the diagnosis of the recordings that lie in a folder came to.
+
+    Raises
+    ------
+    ScaraIdentError
+        If the folder's diagnosis cannot be read.
+    """
+    content = read_diagnosis(folder / "diagnosis.json")
+    found = [
+        f"{item['effect']} on {item['joint']}" if item["joint"] else item["effect"]
+        for item in content.get("effects", ())
+    ]
+    said = f"found {', '.join(found)}" if found else "no effect found"
+    return f"So far: {content['verdict']}, {said}; all of it in {folder / 'report.html'}."
+
+
 def read_asked(folder: Path) -> Asked | None:
     """Return how far a folder is; None where nothing was asked.
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from scara_ident import asking
-from scara_ident.asking import Asked, Settings, ask, key_of, read_asked, still_open, worth_recording
+from scara_ident.asking import Asked, Settings, ask, key_of, read_asked, still_open, told_so_far, worth_recording
 from scara_ident.diagnosis.answerability import inquire
 from scara_ident.diagnosis.questions import Question, questions
 from scara_ident.errors import ScaraIdentError
@@ -50,6 +50,19 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setattr(asking, "diagnose", lambda *_, **__: open_diagnosis())
     monkeypatch.setattr(asking, "diagnosis_report", lambda path, _: path.write_text("a report", encoding="utf-8"))
     return tmp_path
+
+
+def test_what_the_diagnosis_came_to_is_told_in_a_line(tmp_path: Path):
+    content = {"verdict": "undecided", "model": "basic", "next": [], "effects": []}
+    for effects, said in (
+        ([], "no effect found"),
+        (
+            [{"effect": "spring", "joint": "joint1"}, {"effect": "base_tilt", "joint": None}],
+            "found spring on joint1, base_tilt",
+        ),
+    ):
+        (tmp_path / "diagnosis.json").write_text(json.dumps({**content, "effects": effects}))
+        assert told_so_far(tmp_path) == f"So far: undecided, {said}; all of it in {tmp_path / 'report.html'}."
 
 
 def test_a_killed_run_is_gone_on_with_and_a_second_one_touches_nothing(

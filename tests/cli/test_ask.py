@@ -5,6 +5,10 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import pytest
+
+from scara_ident import asking
+
 QUICK = ("--starts", "1", "--duration", "4", "--model", "basic")
 
 
@@ -20,6 +24,22 @@ def test_an_empty_folder_asks_for_a_first_motion(command, steps, tmp_path: Path)
     limit = json.loads((tmp_path / "arm" / "next" / "excitation.json").read_text())["limits"]["tool.speed"]
     assert limit["bound"] == 0.5 and limit["share"] <= 1.0
     assert json.loads((tmp_path / "arm" / "ask.json").read_text())["state"] == "record"
+
+
+def test_what_was_found_is_said_before_what_to_record(command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """Of a gear's loss that was found it said that no motion would tell more, and nothing else."""
+    (tmp_path / "recordings").mkdir()
+    (tmp_path / "recordings" / "run_1.csv").write_text("time\n")
+    done = asking.Asked("", "settled", "Nothing is open.")
+    monkeypatch.setattr(asking, "ask", lambda *_: done)
+    assert command("ask", tmp_path).out.strip() == "Nothing is open."
+    found = [{"effect": "spring", "joint": "joint1"}]
+    content = {"verdict": "explained", "model": "basic", "next": [], "effects": found}
+    (tmp_path / "diagnosis.json").write_text(json.dumps(content))
+    said = " ".join(command("ask", tmp_path).out.split())
+    assert said.startswith("So far: explained, found spring on joint1; all of it in ") and said.endswith(
+        "Nothing is open."
+    )
 
 
 def test_a_folder_that_is_not_there_is_not_made(command, tmp_path: Path):
