@@ -237,6 +237,9 @@ def _compared(scales: Mapping[str, float] | None, robot: Robot, slight: Sequence
         for (joint, scale), fits in zip(scales.items(), usual, strict=True)
         if not fits
     )
+    if np.any(usual):
+        # A URDF is often right of the large links and has the small ones roughly.
+        asked = asked.replace("?", " there, or are the masses others?")
     return f"{said}. Torques of the bodies are {odd}: {asked}"
 
 

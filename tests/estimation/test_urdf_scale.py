@@ -105,7 +105,9 @@ def test_friction_brakes_by_all_of_its_law_together(tmp_path):
 
 def test_joints_that_differ_are_named(arm):
     said = scale_sentence({"j1": 1.1, "j2": 30.0}, arm[0])
-    assert said.endswith("Torques of the bodies are 30 times the URDF's on j2: is effort_gain right?")
+    assert said.endswith(
+        "Torques of the bodies are 30 times the URDF's on j2: is effort_gain right there, or are the masses others?"
+    )
 
 
 def test_the_scale_of_one_joint_of_many_is_not_that_of_all(arm):
