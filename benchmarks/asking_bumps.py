@@ -9,9 +9,9 @@ import numpy as np
 from asking_sets import ASKED, EFFORT, SAMPLED, as_reference, found_effects, poor_motion, robot_named
 
 from scara_ident.diagnosis import diagnose
-from scara_ident.diagnosis.answerability import inquire, known_rows
-from scara_ident.diagnosis.shape import KNOTS
 from scara_ident.excitation import design_excitation, limits_of
+from scara_ident.inquiry.answerability import inquire, known_rows
+from scara_ident.inquiry.shape import KNOTS
 from scara_ident.recording.recording import Recording
 from scara_ident.simulation import ReferenceMotion, simulate, virtual_arm
 

@@ -14,19 +14,19 @@ from virtual_motions import RATE, random_motion, ranges
 from virtual_sets import _random_effect
 
 from scara_ident.diagnosis import Diagnosis, diagnose
-from scara_ident.diagnosis.answerability import inquire, knowing
-from scara_ident.diagnosis.belief import believed
-from scara_ident.diagnosis.candidate_tests import examine
-from scara_ident.diagnosis.candidates import CandidateColumns
-from scara_ident.diagnosis.correction import corrected
-from scara_ident.diagnosis.fitted_model import FittedModel
-from scara_ident.diagnosis.questions import Question, Suspect, suspects_in_model
-from scara_ident.diagnosis.selection_step import fitted_model
-from scara_ident.diagnosis.torque_noise import noise_density
+from scara_ident.diagnosis.candidates.candidates import CandidateColumns
+from scara_ident.diagnosis.fitting.correction import corrected
+from scara_ident.diagnosis.testing.candidate_tests import examine
+from scara_ident.diagnosis.testing.fitted_model import FittedModel
+from scara_ident.diagnosis.testing.selection_step import fitted_model
 from scara_ident.estimation.observations import observe
 from scara_ident.excitation import Design, Effort, Limits, design_excitation, limits_of
 from scara_ident.excitation.promise import all_rows
 from scara_ident.identification.usable import usable_in_bands
+from scara_ident.inquiry.answerability import inquire, knowing
+from scara_ident.inquiry.belief import believed
+from scara_ident.inquiry.questions import Question, Suspect, suspects_in_model
+from scara_ident.inquiry.torque_noise import noise_density
 from scara_ident.model.model import build_model
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import Robot, load_robot

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from attribution_right import Item, hits, not_there, right, wrong
 
-from scara_ident.diagnosis.held_out_gain import HeldOutGain
+from scara_ident.diagnosis.held_out.gain import HeldOutGain
 
 NOT_SINGLE = ("none", "pair", "triple", "unlisted")
 SEVERAL = ("pair", "triple")

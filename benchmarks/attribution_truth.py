@@ -21,11 +21,11 @@ from virtual_sets import VirtualSet, simulate_set
 
 from scara_ident.arrays import Array
 from scara_ident.diagnosis import Diagnosis, diagnose
-from scara_ident.diagnosis.candidates import Candidate, CandidateColumns
-from scara_ident.diagnosis.correction import taken_out
-from scara_ident.diagnosis.nonlinear_fit import tune
-from scara_ident.diagnosis.search import scene_of
-from scara_ident.diagnosis.selection_step import SelectionStep, model_with, observed_at_every_sample
+from scara_ident.diagnosis.candidates.candidates import Candidate, CandidateColumns
+from scara_ident.diagnosis.fitting.correction import taken_out
+from scara_ident.diagnosis.fitting.nonlinear_fit import tune
+from scara_ident.diagnosis.selection.search import scene_of
+from scara_ident.diagnosis.testing.selection_step import SelectionStep, model_with, observed_at_every_sample
 from scara_ident.effects import CATALOGUE, Member, Scene
 from scara_ident.effects.measurement import TimeDelay, shifted
 from scara_ident.errors import ScaraIdentError

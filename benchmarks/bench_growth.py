@@ -14,8 +14,8 @@ from ways import high_water
 from ways import robot_of as with_joints
 
 from scara_ident import Motion, build_model, identify, load_robot
-from scara_ident.diagnosis.candidates import CandidateColumns
-from scara_ident.diagnosis.search import scene_of
+from scara_ident.diagnosis.candidates.candidates import CandidateColumns
+from scara_ident.diagnosis.selection.search import scene_of
 from scara_ident.estimation.from_motion import information_of
 from scara_ident.fleet.visit import watched
 

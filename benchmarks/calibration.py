@@ -28,8 +28,8 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 from scipy.stats import beta, norm
 
-from scara_ident.diagnosis.candidate_tests import examine
-from scara_ident.diagnosis.fitted_model import FittedModel
+from scara_ident.diagnosis.testing.candidate_tests import examine
+from scara_ident.diagnosis.testing.fitted_model import FittedModel
 from scara_ident.estimation.joint_rows import JointRows
 from scara_ident.fleet.engine import run_all
 

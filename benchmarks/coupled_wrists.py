@@ -26,8 +26,8 @@ from rigid_runs import RigidRuns, rigid_runs
 from virtual_conditions import Asked
 
 from scara_ident.diagnosis import Diagnosis, diagnose
-from scara_ident.diagnosis.candidates import Candidate
-from scara_ident.diagnosis.selection_step import model_with
+from scara_ident.diagnosis.candidates.candidates import Candidate
+from scara_ident.diagnosis.testing.selection_step import model_with
 from scara_ident.effects import Member, effects_named
 from scara_ident.estimation.least_squares import wls
 from scara_ident.estimation.observations import observe

@@ -20,14 +20,14 @@ from dataclasses import replace
 import numpy as np
 from virtual_motions import random_motion
 
-from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, columns_at_hand
-from scara_ident.diagnosis.cluster_test import needed
+from scara_ident.diagnosis.candidates.candidates import Candidate, CandidateColumns, columns_at_hand
 from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.diagnose import Diagnosis, diagnose
-from scara_ident.diagnosis.evidence import least_found
-from scara_ident.diagnosis.linearised import linearise
-from scara_ident.diagnosis.selection_step import best_of_each
-from scara_ident.diagnosis.trust_region import least_squares
+from scara_ident.diagnosis.evidence.evidence import least_found
+from scara_ident.diagnosis.fitting.linearised import linearise
+from scara_ident.diagnosis.fitting.trust_region import least_squares
+from scara_ident.diagnosis.testing.cluster_test import needed
+from scara_ident.diagnosis.testing.selection_step import best_of_each
 from scara_ident.effects import EffectTerm, Member, Scene
 from scara_ident.effects.catalogue import effects_named
 from scara_ident.effects.links import usual_link_inertia

@@ -37,9 +37,9 @@ PARTS = ("start", "base", "columns", "look", "page")
 PLACES = (
     ("scara_ident.diagnosis.diagnose", None, "usable_in_bands", "base"),
     ("scara_ident.diagnosis.diagnose", None, "observe", "base"),
-    ("scara_ident.diagnosis.search", None, "wls", "base"),
-    ("scara_ident.diagnosis.candidates", "CandidateColumns", "rows", "columns"),
-    ("scara_ident.diagnosis.selection_step", "SelectionStep", "judge", "look"),
+    ("scara_ident.diagnosis.selection.search", None, "wls", "base"),
+    ("scara_ident.diagnosis.candidates.candidates", "CandidateColumns", "rows", "columns"),
+    ("scara_ident.diagnosis.testing.selection_step", "SelectionStep", "judge", "look"),
     ("scara_ident.report.html.diagnosis", None, "diagnosis_report", "page"),
 )
 

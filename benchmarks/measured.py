@@ -25,10 +25,10 @@ import numpy as np
 
 from scara_ident import Recording, load_robot, read_recordings
 from scara_ident.diagnosis import Diagnosis, diagnose
-from scara_ident.diagnosis.candidates import CandidateColumns, columns_at_hand
-from scara_ident.diagnosis.correction import corrected
-from scara_ident.diagnosis.search import Search
-from scara_ident.diagnosis.selection_step import SelectionStep, observed
+from scara_ident.diagnosis.candidates.candidates import CandidateColumns, columns_at_hand
+from scara_ident.diagnosis.fitting.correction import corrected
+from scara_ident.diagnosis.selection.search import Search
+from scara_ident.diagnosis.testing.selection_step import SelectionStep, observed
 from scara_ident.errors import RecordingError
 from scara_ident.estimation.least_squares import value_and_weights
 from scara_ident.estimation.observations import Observations, observe

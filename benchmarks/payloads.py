@@ -31,8 +31,8 @@ from virtual_conditions import Asked
 
 from scara_ident import Recording, load_robot, read_recordings
 from scara_ident.diagnosis import Diagnosis, diagnose
-from scara_ident.diagnosis.candidates import Candidate
-from scara_ident.diagnosis.selection_step import model_with
+from scara_ident.diagnosis.candidates.candidates import Candidate
+from scara_ident.diagnosis.testing.selection_step import model_with
 from scara_ident.effects import Member, effects_named
 from scara_ident.effects.links import tool_of
 from scara_ident.estimation.estimate import joint_errors

@@ -15,8 +15,6 @@ from pathlib import Path
 from typing import Any, Literal
 
 from scara_ident.diagnosis import diagnose
-from scara_ident.diagnosis.answerability import Inquiry, inquiry_of
-from scara_ident.diagnosis.questions import Question
 from scara_ident.errors import ScaraIdentError
 from scara_ident.excitation.design import Design, design_excitation
 from scara_ident.excitation.known import read_diagnosis, read_parameters
@@ -25,6 +23,8 @@ from scara_ident.excitation.output import excitation_dict, write_joint_trajector
 from scara_ident.excitation.promise import SURE, Told
 from scara_ident.excitation.search import Effort, Progress
 from scara_ident.files import write_json, written_together
+from scara_ident.inquiry.answerability import Inquiry, inquiry_of
+from scara_ident.inquiry.questions import Question
 from scara_ident.model.model import build_model
 from scara_ident.progress import Work
 from scara_ident.recording.apart import read_usable

@@ -10,15 +10,15 @@ import pytest
 
 from scara_ident import asking
 from scara_ident.asking import Asked, Settings, ask, key_of, read_asked, still_open, told_so_far, worth_recording
-from scara_ident.diagnosis.answerability import inquire
-from scara_ident.diagnosis.questions import Question, questions
 from scara_ident.errors import ScaraIdentError
 from scara_ident.excitation import Effort, limits_of
 from scara_ident.excitation.promise import Shown, Told
+from scara_ident.inquiry.answerability import inquire
+from scara_ident.inquiry.questions import Question, questions
 from scara_ident.recording.recording import write_recording
 from scara_ident.robot.robot import load_robot
-from tests.diagnosis.asked import PAIR, open_diagnosis, small_runs
 from tests.excitation.designs import hurry
+from tests.inquiry.asked import PAIR, open_diagnosis, small_runs
 
 # All of the limits: so short a motion of so short a search tells too little within less.
 QUICK = Settings(

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 from statistics import median
@@ -20,10 +21,19 @@ ROOMS = (
     "errors", "arrays", "threads", "processes", "progress", "registry", "files", "memory", "quiet",
     "manners",
     "robot", "paper", "recording", "motion", "model", "estimation", "inspection", "identification",
-    "effects", "diagnosis", "online", "excitation", "export", "simulation", "fleet", "use", "report", "asking", "cli",
+    "effects", "diagnosis", "inquiry", "online", "excitation", "export", "simulation", "fleet", "use", "report", "asking", "cli",
     "__main__",
 )  # fmt: skip
+# Rooms within a room, in the same way.
+WITHIN = {
+    "diagnosis": (
+        "criteria", "work", "candidates", "testing", "fitting", "checks", "selection", "evidence", "held_out",
+        "whole_estimate", "proxies", "model_selection", "found_effect", "braking_evidence", "verdict", "diagnose",
+    ),
+}  # fmt: skip
 LARGEST, MEDIAN = 400, 145
+# Modules that lie side by side in a room: of more nobody sees at a glance which one to open.
+MOST = 45
 
 
 def modules(package: Path) -> dict[str, Path]:
@@ -70,9 +80,9 @@ def graph(package: Path) -> dict[str, set[str]]:
     return found
 
 
-def upward(found: dict[str, set[str]]) -> list[str]:
+def upward(found: dict[str, set[str]], rooms: Sequence[str] = ROOMS) -> list[str]:
     """Imports that go up the list of rooms."""
-    place = {room: k for k, room in enumerate(ROOMS)}
+    place = {room: k for k, room in enumerate(rooms)}
     return sorted(
         f"{name} imports {target}"
         for name, targets in found.items()
@@ -81,8 +91,19 @@ def upward(found: dict[str, set[str]]) -> list[str]:
     )
 
 
+def within(found: dict[str, set[str]], room: str) -> dict[str, set[str]]:
+    """What the modules of a room import of the same room, by their names in it."""
+    inside = {name.removeprefix(f"{room}."): targets for name, targets in found.items() if name.startswith(f"{room}.")}
+    return {
+        name: {target.removeprefix(f"{room}.") for target in targets if target.startswith(f"{room}.")}
+        for name, targets in inside.items()
+    }
+
+
 def test_every_room_is_in_the_list():
     assert {name.split(".")[0] for name in modules(PACKAGE)} == set(ROOMS)
+    for room, order in WITHIN.items():
+        assert {name.split(".")[0] for name in within(graph(PACKAGE), room)} == set(order)
 
 
 def test_no_import_goes_up_or_round():
@@ -90,6 +111,15 @@ def test_no_import_goes_up_or_round():
     assert sum(map(len, found.values())) > 300
     assert upward(found) == []
     TopologicalSorter(found).prepare()
+    for room, order in WITHIN.items():
+        inside = within(found, room)
+        assert sum(map(len, inside.values())) > 100
+        assert upward(inside, order) == []
+
+
+def test_no_room_is_a_heap():
+    sizes = Counter(path.parent.relative_to(PACKAGE).as_posix() for path in modules(PACKAGE).values())
+    assert {room: size for room, size in sizes.items() if size > MOST} == {}
 
 
 def test_the_test_sees_imports_in_functions_and_cycles(tmp_path: Path):
@@ -99,6 +129,8 @@ def test_the_test_sees_imports_in_functions_and_cycles(tmp_path: Path):
     (tmp_path / "robot" / "down.py").write_text("def late():\n    import scara_ident.model.up\n")
     found = graph(tmp_path)
     assert upward(found) == ["robot.down imports model.up"]
+    assert within({"a.b.c": {"a.d.e", "f"}, "f": {"a.d.e"}}, "a") == {"b.c": {"d.e"}}
+    assert upward({"b.c": {"d.e"}}, ("b", "d")) == ["b.c imports d.e"]
     with pytest.raises(CycleError):
         TopologicalSorter(found).prepare()
     (tmp_path / "robot" / "down.py").write_text("if TYPE_CHECKING:\n    from scara_ident.model import up\n")

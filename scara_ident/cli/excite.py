@@ -84,7 +84,6 @@ def excite(
 
     from scara_ident.cli.joint_values import joint_numbers, numbers
     from scara_ident.cli.reading import read_beside
-    from scara_ident.diagnosis.answerability import inquiry_of
     from scara_ident.errors import UsageError
     from scara_ident.estimation.estimate import PAPER_SAMPLES
     from scara_ident.excitation import (
@@ -107,6 +106,7 @@ def excite(
     from scara_ident.export.result import read_robot
     from scara_ident.files import write_json
     from scara_ident.identification.identify import known_information
+    from scara_ident.inquiry.answerability import inquiry_of
     from scara_ident.model.model import build_model
     from scara_ident.report.html.excitation import excitation_report
     from scara_ident.report.pictures import design_picture

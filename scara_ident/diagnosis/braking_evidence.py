@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from scara_ident.diagnosis.evidence import Evidence
+from scara_ident.diagnosis.evidence.evidence import Evidence
 from scara_ident.diagnosis.found_effect import FoundEffect
 from scara_ident.estimation import Estimate
 from scara_ident.estimation.observations import Observations

@@ -56,7 +56,7 @@ class SelectionCriteria:
         0.9,
         "share of squared residual",
         "what removes as much leaves little but noise on its joint, and is tested by single rows too",
-        "diagnosis/row_test.py",
+        "diagnosis/testing/row_test.py",
     )
     least_votes: float = _criterion(
         0.75, "of voting trajectories", "an effect of the arm helps on most motions that excite it", "docs/decisions.md"

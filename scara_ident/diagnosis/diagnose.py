@@ -9,10 +9,12 @@ from dataclasses import dataclass, replace
 from numpy.typing import ArrayLike
 
 from scara_ident.arrays import Array
-from scara_ident.diagnosis.confounding import confounders
+from scara_ident.diagnosis.checks.other_laws import parameters_of_laws
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
-from scara_ident.diagnosis.effect_parameters import PhysicalParameters, RotorInertia, physical_parameters
-from scara_ident.diagnosis.evidence import Evidence
+from scara_ident.diagnosis.evidence.evidence import Evidence
+from scara_ident.diagnosis.evidence.outcome import Outcome, Unexplained
+from scara_ident.diagnosis.evidence.standing_lines import standing_lines, tentative_lines
+from scara_ident.diagnosis.fitting.effect_parameters import PhysicalParameters, RotorInertia, physical_parameters
 from scara_ident.diagnosis.found_effect import (
     FoundEffect,
     direct_readings,
@@ -20,17 +22,15 @@ from scara_ident.diagnosis.found_effect import (
     not_found,
     uncounted_correction,
 )
-from scara_ident.diagnosis.interval_events import not_explained
-from scara_ident.diagnosis.lack_of_fit import LackOfFit
+from scara_ident.diagnosis.held_out.validation import Validation, validated
 from scara_ident.diagnosis.model_selection import select_model, told_where_quiet
-from scara_ident.diagnosis.other_laws import parameters_of_laws
-from scara_ident.diagnosis.outcome import Outcome, Unexplained
-from scara_ident.diagnosis.screening import Dependence
-from scara_ident.diagnosis.search import Search, SearchTask
-from scara_ident.diagnosis.selection_step import SelectionStep
-from scara_ident.diagnosis.standing_lines import standing_lines, tentative_lines
-from scara_ident.diagnosis.tentative import TentativeEffect, tentative_effects
-from scara_ident.diagnosis.validation import Validation, validated
+from scara_ident.diagnosis.selection.confounding import confounders
+from scara_ident.diagnosis.selection.interval_events import not_explained
+from scara_ident.diagnosis.selection.search import Search, SearchTask
+from scara_ident.diagnosis.selection.tentative import TentativeEffect, tentative_effects
+from scara_ident.diagnosis.testing.lack_of_fit import LackOfFit
+from scara_ident.diagnosis.testing.screening import Dependence
+from scara_ident.diagnosis.testing.selection_step import SelectionStep
 from scara_ident.diagnosis.verdict import Verdict, verdict_of, weighed_evidence
 from scara_ident.diagnosis.whole_estimate import with_whole_estimate
 from scara_ident.diagnosis.work import first, searching

@@ -7,12 +7,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from scara_ident.diagnosis.candidates import Candidate
-from scara_ident.diagnosis.confounding import Confounder
-from scara_ident.diagnosis.effect_parameters import Coefficients, PhysicalParameters, told_size
-from scara_ident.diagnosis.held_out_gain import HeldOutGain
-from scara_ident.diagnosis.search import Search
-from scara_ident.diagnosis.setpoints import OR_ELSE, may_be_setpoints
+from scara_ident.diagnosis.candidates.candidates import Candidate
+from scara_ident.diagnosis.checks.setpoints import OR_ELSE, may_be_setpoints
+from scara_ident.diagnosis.fitting.effect_parameters import Coefficients, PhysicalParameters, told_size
+from scara_ident.diagnosis.held_out.gain import HeldOutGain
+from scara_ident.diagnosis.selection.confounding import Confounder
+from scara_ident.diagnosis.selection.search import Search
 from scara_ident.effects import Effect, Parameter
 from scara_ident.estimation.run_offsets import rms_of
 

@@ -7,18 +7,24 @@ from dataclasses import replace
 
 import numpy as np
 
-from scara_ident.diagnosis.acceptance import Decision, hopeless
-from scara_ident.diagnosis.audit import beaten_by_impossible, beaten_by_its_like, outdone, superfluous, unsettled
-from scara_ident.diagnosis.candidates import Candidate, CandidateColumns
-from scara_ident.diagnosis.choice import fitted_beside, more_than_chance
+from scara_ident.diagnosis.candidates.candidates import Candidate, CandidateColumns
+from scara_ident.diagnosis.checks.noise_check import noise_objection
+from scara_ident.diagnosis.checks.other_minima import quieter
 from scara_ident.diagnosis.criteria import SelectionCriteria
-from scara_ident.diagnosis.noise_check import noise_objection
-from scara_ident.diagnosis.other_minima import quieter
-from scara_ident.diagnosis.outcome import Outcome, outcome_of
+from scara_ident.diagnosis.evidence.outcome import Outcome, outcome_of
 from scara_ident.diagnosis.proxies import proxies
-from scara_ident.diagnosis.search import Search, SearchTask, in_place_of, scene_of, search, search_again
-from scara_ident.diagnosis.selection_step import SelectionStep
-from scara_ident.diagnosis.told_in import told_in
+from scara_ident.diagnosis.selection.audit import (
+    beaten_by_impossible,
+    beaten_by_its_like,
+    outdone,
+    superfluous,
+    unsettled,
+)
+from scara_ident.diagnosis.selection.choice import fitted_beside, more_than_chance
+from scara_ident.diagnosis.selection.search import Search, SearchTask, in_place_of, scene_of, search, search_again
+from scara_ident.diagnosis.selection.told_in import told_in
+from scara_ident.diagnosis.testing.acceptance import Decision, hopeless
+from scara_ident.diagnosis.testing.selection_step import SelectionStep
 from scara_ident.diagnosis.work import first, next_of
 from scara_ident.estimation import wls
 from scara_ident.estimation.bands import HIGHEST_BAND, choose_bands

@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.criteria import SelectionCriteria
-from scara_ident.diagnosis.moments import examine_moments
-from scara_ident.diagnosis.outcome import Outcome
-from scara_ident.diagnosis.search_state import Step
-from scara_ident.diagnosis.selection_step import SelectionStep, observed
+from scara_ident.diagnosis.evidence.outcome import Outcome
+from scara_ident.diagnosis.selection.search_state import Step
+from scara_ident.diagnosis.testing.acceptance import Decision
+from scara_ident.diagnosis.testing.moments import examine_moments
+from scara_ident.diagnosis.testing.selection_step import SelectionStep, observed
 from scara_ident.estimation.least_squares import value_and_weights
 from scara_ident.estimation.noise_bias import noise_torque
 from scara_ident.estimation.run_offsets import rms_of

@@ -6,18 +6,18 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Literal
 
-from scara_ident.diagnosis.audit import left_open
 from scara_ident.diagnosis.braking_evidence import braking_evidence
 from scara_ident.diagnosis.criteria import SelectionCriteria
-from scara_ident.diagnosis.even_evidence import even_evidence
-from scara_ident.diagnosis.evidence import Evidence, evidence, held_out_evidence
+from scara_ident.diagnosis.evidence.even_evidence import even_evidence
+from scara_ident.diagnosis.evidence.evidence import Evidence, evidence, held_out_evidence
+from scara_ident.diagnosis.evidence.late_evidence import late_evidence
+from scara_ident.diagnosis.evidence.outcome import Outcome
+from scara_ident.diagnosis.evidence.standing_lines import StandingLine, without_lines
+from scara_ident.diagnosis.evidence.steady_evidence import steady_evidence
 from scara_ident.diagnosis.found_effect import FoundEffect
-from scara_ident.diagnosis.held_out_gain import spoken_against
-from scara_ident.diagnosis.late_evidence import late_evidence
-from scara_ident.diagnosis.outcome import Outcome
-from scara_ident.diagnosis.standing_lines import StandingLine, without_lines
-from scara_ident.diagnosis.steady_evidence import steady_evidence
-from scara_ident.diagnosis.validation import Validation
+from scara_ident.diagnosis.held_out.gain import spoken_against
+from scara_ident.diagnosis.held_out.validation import Validation
+from scara_ident.diagnosis.selection.audit import left_open
 from scara_ident.estimation.noise_bias import noise_signals
 from scara_ident.estimation.run_offsets import rms_of
 

@@ -10,10 +10,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from scara_ident.diagnosis.at_estimate import at_estimate
-from scara_ident.diagnosis.effect_parameters import LinearParameters
-from scara_ident.diagnosis.outcome import Outcome
-from scara_ident.diagnosis.selection_step import observed_at_every_sample
+from scara_ident.diagnosis.evidence.outcome import Outcome
+from scara_ident.diagnosis.fitting.at_estimate import at_estimate
+from scara_ident.diagnosis.fitting.effect_parameters import LinearParameters
+from scara_ident.diagnosis.testing.selection_step import observed_at_every_sample
 from scara_ident.estimation.information import weighted
 
 

@@ -10,7 +10,6 @@ from functools import cached_property
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.diagnosis.answerability import Inquiry, inquire
 from scara_ident.diagnosis.diagnose import Diagnosis
 from scara_ident.errors import ArgumentError, ScaraIdentError, UsageError
 from scara_ident.estimation.information import Information, merge
@@ -25,6 +24,7 @@ from scara_ident.excitation.sensitivity import SmoothModel
 from scara_ident.excitation.size import SAMPLES, check_size, default_harmonics, durations_of, harmonics_of
 from scara_ident.excitation.tell import search_to_tell
 from scara_ident.excitation.verification import Reached, reached
+from scara_ident.inquiry.answerability import Inquiry, inquire
 from scara_ident.manners import Saved
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.motion import Motion
@@ -158,7 +158,7 @@ def design_excitation(
         By default the log determinant.
     tell : Inquiry or Diagnosis, optional
         Instead of a criterion, the questions that one motion of harmonics is to answer best, about this model; see
-        `scara_ident.diagnosis.answerability`.
+        `scara_ident.inquiry.answerability`.
     limits : Limits, optional
         By default those of `limits_of`.
     known : mapping from parameter to value, optional

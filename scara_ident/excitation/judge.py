@@ -15,14 +15,14 @@ from itertools import compress
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.diagnosis.answerability import Inquiry, known_rows
-from scara_ident.diagnosis.belief import Blocks, believed, known_blocks
-from scara_ident.diagnosis.questions import Question
 from scara_ident.estimation.information import Information
 from scara_ident.excitation.curves import Basis
 from scara_ident.excitation.promise import SURE, KnownBlocks, all_rows
 from scara_ident.excitation.search import UNSEEN
 from scara_ident.excitation.verification import grid
+from scara_ident.inquiry.answerability import Inquiry, known_rows
+from scara_ident.inquiry.belief import Blocks, believed, known_blocks
+from scara_ident.inquiry.questions import Question
 from scara_ident.motion.motion import Motion
 from scara_ident.motion.rest import Bands
 

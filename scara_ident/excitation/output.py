@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.diagnosis.next_steps import capital
 from scara_ident.errors import ScaraIdentError, UsageError
 from scara_ident.estimation.information import Information
 from scara_ident.excitation.criteria import BlockLogDet, Condition
@@ -20,6 +19,7 @@ from scara_ident.excitation.design import Design, information_of
 from scara_ident.excitation.limits import scara03_friction
 from scara_ident.excitation.stopping import Stopping
 from scara_ident.files import write_text
+from scara_ident.inquiry.next_steps import capital
 from scara_ident.recording.files.parquet_csv import write_columns
 
 RATE = 1000.0

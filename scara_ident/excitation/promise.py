@@ -9,12 +9,12 @@ from functools import reduce
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.diagnosis.answerability import Inquiry
-from scara_ident.diagnosis.belief import Blocks, believed, known_blocks
-from scara_ident.diagnosis.candidates import Candidate, Rows
+from scara_ident.diagnosis.candidates.candidates import Candidate, Rows
 from scara_ident.diagnosis.criteria import CRITERIA
-from scara_ident.diagnosis.questions import MOST_NAMED, Question, Suspect
 from scara_ident.effects import Parameter, Scene, Signals
+from scara_ident.inquiry.answerability import Inquiry
+from scara_ident.inquiry.belief import Blocks, believed, known_blocks
+from scara_ident.inquiry.questions import MOST_NAMED, Question, Suspect
 from scara_ident.manners import listed
 from scara_ident.motion.motion import Motion
 from scara_ident.motion.prepared import block_seconds

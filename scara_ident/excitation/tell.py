@@ -15,7 +15,6 @@ from functools import lru_cache, partial
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.diagnosis.answerability import Inquiry
 from scara_ident.excitation.curves import Basis
 from scara_ident.excitation.interior_point import Minimum
 from scara_ident.excitation.judge import Judge, rows_over
@@ -33,6 +32,7 @@ from scara_ident.excitation.search import (
     verified_inside,
     within_grid,
 )
+from scara_ident.inquiry.answerability import Inquiry
 from scara_ident.processes import map_in_order
 from scara_ident.threads import one_blas_thread
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.diagnose import Diagnosis
-from scara_ident.diagnosis.held_out_gain import HeldOutGain, shown_of
+from scara_ident.diagnosis.held_out.gain import HeldOutGain, shown_of
 from scara_ident.effects import EffectTerm
 from scara_ident.estimation.consistent.estimator import ConsistentEstimate
 from scara_ident.estimation.estimate import joint_errors

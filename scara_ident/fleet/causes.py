@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
-from scara_ident.diagnosis.candidates import Candidate
+from scara_ident.diagnosis.candidates.candidates import Candidate
 from scara_ident.effects import Scene
 from scara_ident.effects.links import tool_of
 from scara_ident.effects.parameters import Parameter

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
-from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, Rows, columns_at_hand, with_columns
-from scara_ident.diagnosis.search import scene_of
+from scara_ident.diagnosis.candidates.candidates import Candidate, CandidateColumns, Rows, columns_at_hand, with_columns
+from scara_ident.diagnosis.selection.search import scene_of
 from scara_ident.effects import Scene
 from scara_ident.effects.catalogue import available_effects
 from scara_ident.errors import ScaraIdentError

@@ -7,19 +7,19 @@ from typing import Any
 
 import numpy as np
 
-from scara_ident.diagnosis.acceptance import Decision
 from scara_ident.diagnosis.diagnose import Diagnosis
-from scara_ident.diagnosis.effect_parameters import RotorInertia
-from scara_ident.diagnosis.evidence import least_found
+from scara_ident.diagnosis.evidence.evidence import least_found
+from scara_ident.diagnosis.fitting.effect_parameters import RotorInertia
 from scara_ident.diagnosis.found_effect import FoundEffect
-from scara_ident.diagnosis.next_steps import next_steps
-from scara_ident.diagnosis.questions import suspects_in_model
-from scara_ident.diagnosis.torque_noise import noise_density
+from scara_ident.diagnosis.testing.acceptance import Decision
 from scara_ident.estimation.estimate import joint_errors
 from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.run_offsets import rms_of
 from scara_ident.estimation.urdf_scale import urdf_scale
 from scara_ident.export.result import KEY, rebuild_entry
+from scara_ident.inquiry.next_steps import next_steps
+from scara_ident.inquiry.questions import suspects_in_model
+from scara_ident.inquiry.torque_noise import noise_density
 from scara_ident.model.urdf_values import urdf_values
 from scara_ident.report.diagnosis_words import told
 from scara_ident.report.identification import bias_of

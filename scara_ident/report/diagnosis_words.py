@@ -7,15 +7,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from scara_ident.diagnosis.diagnose import Diagnosis
-from scara_ident.diagnosis.effect_parameters import RotorInertia
-from scara_ident.diagnosis.evidence import Evidence
+from scara_ident.diagnosis.evidence.evidence import Evidence
+from scara_ident.diagnosis.evidence.outcome import Unexplained
+from scara_ident.diagnosis.fitting.effect_parameters import RotorInertia
 from scara_ident.diagnosis.found_effect import FoundEffect
-from scara_ident.diagnosis.held_out_gain import shown_of, words_of
-from scara_ident.diagnosis.next_steps import next_steps
-from scara_ident.diagnosis.outcome import Unexplained
+from scara_ident.diagnosis.held_out.gain import shown_of, words_of
 from scara_ident.effects import Parameter
 from scara_ident.estimation.run_offsets import rms_of
 from scara_ident.estimation.urdf_weight import told_scale
+from scara_ident.inquiry.next_steps import next_steps
 from scara_ident.model.terms.friction import Friction
 from scara_ident.report.doubts import doubts
 from scara_ident.report.identification import bias_said

@@ -15,8 +15,8 @@ from scara_ident.files import write_json
 from scara_ident.recording.recording import write_recording
 from scara_ident.report.diagnosis import diagnosis_dict
 from scara_ident.robot.robot import embedded_urdf
-from tests.diagnosis.asked import PAIR, open_diagnosis, small_runs
 from tests.excitation.designs import hurry
+from tests.inquiry.asked import PAIR, open_diagnosis, small_runs
 
 
 @pytest.mark.slow

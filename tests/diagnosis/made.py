@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from scara_ident.diagnosis.candidates import Candidate, CandidateColumns, Rows
+from scara_ident.diagnosis.candidates.candidates import Candidate, CandidateColumns, Rows
 from scara_ident.diagnosis.criteria import CRITERIA
-from scara_ident.diagnosis.fitted_model import FittedModel
-from scara_ident.diagnosis.search import Search, SearchTask, scene_of, search
-from scara_ident.diagnosis.selection_step import SelectionStep
+from scara_ident.diagnosis.selection.search import Search, SearchTask, scene_of, search
+from scara_ident.diagnosis.testing.fitted_model import FittedModel
+from scara_ident.diagnosis.testing.selection_step import SelectionStep
 from scara_ident.effects import Coefficient, Effect, Member, NonlinearParameter
 from scara_ident.effects.position import Spring
 from scara_ident.estimation import Estimate, wls

@@ -8,7 +8,7 @@ import pytest
 
 from scara_ident.diagnosis import diagnose
 from scara_ident.diagnosis.braking_evidence import braking_evidence
-from scara_ident.diagnosis.evidence import Evidence
+from scara_ident.diagnosis.evidence.evidence import Evidence
 from scara_ident.estimation import wls
 from scara_ident.report.diagnosis_words import sentences
 from scara_ident.robot.robot import load_robot

@@ -12,16 +12,19 @@ import pytest
 
 import scara_ident
 from scara_ident.diagnosis import diagnose
+from scara_ident.diagnosis.candidates.lines import line_candidates
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
-from scara_ident.diagnosis.lines import line_candidates
-from scara_ident.diagnosis.screening import screen
+from scara_ident.diagnosis.testing.screening import screen
 from scara_ident.effects.periodic import TorqueRipple, Vibration
 from scara_ident.effects.position import Spring
 from scara_ident.robot.robot import load_robot
 from tests.diagnosis.made import BANDS, complete, exact_runs, residuals_of, step_beside, with_torque
 
 PACKAGE = Path(scara_ident.__file__).parent
-DECIDING = ("acceptance", "candidate_tests", "confounding", "model_selection", "outcome", "proxies", "search")
+DECIDING = (
+    "testing/acceptance", "testing/candidate_tests", "selection/search", "selection/confounding", "evidence/outcome",
+    "model_selection", "proxies",
+)  # fmt: skip
 # How many columns are worked on at once, and rounding.
 NUMERICS = {"_COLUMNS", "_RANK"}
 
@@ -167,7 +170,7 @@ def test_a_signal_says_nothing_with_too_few_samples_in_a_bin():
 def test_every_criterion_is_read_somewhere():
     read = {
         node.attr
-        for path in (PACKAGE / "diagnosis").glob("*.py")
+        for path in (PACKAGE / "diagnosis").rglob("*.py")
         if path.stem != "criteria"
         for node in ast.walk(syntax(path))
         if isinstance(node, ast.Attribute)
@@ -184,9 +187,9 @@ def test_no_other_number_decides(name: str):
         assert {item.value for item in numbers(statement)} <= {0, 0.5, 1, 2, 3}, ast.unparse(statement)
 
 
-@pytest.mark.parametrize("room", ["diagnosis", "effects"])
+@pytest.mark.parametrize("room", ["diagnosis", "inquiry", "effects"])
 def test_every_constant_says_what_it_is_for(room: str):
-    for path in sorted((PACKAGE / room).glob("*.py")):
+    for path in sorted((PACKAGE / room).rglob("*.py")):
         lines = path.read_text(encoding="utf-8").splitlines()
         for statement in syntax(path).body:
             if not isinstance(statement, ast.Assign) or any(isinstance(x, ast.Call) for x in ast.walk(statement)):

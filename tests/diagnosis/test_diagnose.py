@@ -10,9 +10,9 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from scara_ident.diagnosis import diagnose
-from scara_ident.diagnosis.candidates import columns_at_hand
-from scara_ident.diagnosis.outcome import outcome_of
-from scara_ident.diagnosis.told_in import told_in
+from scara_ident.diagnosis.candidates.candidates import columns_at_hand
+from scara_ident.diagnosis.evidence.outcome import outcome_of
+from scara_ident.diagnosis.selection.told_in import told_in
 from scara_ident.effects import CATALOGUE, Coefficient, Effect, effects_named
 from scara_ident.effects.friction import AsymmetricFriction, Stribeck
 from scara_ident.effects.measurement import TimeDelay, shifted

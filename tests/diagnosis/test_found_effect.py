@@ -10,12 +10,12 @@ import pytest
 
 from scara_ident.diagnosis import diagnose
 from scara_ident.diagnosis.criteria import CRITERIA
-from scara_ident.diagnosis.effect_parameters import physical_parameters
+from scara_ident.diagnosis.fitting.effect_parameters import physical_parameters
 from scara_ident.diagnosis.found_effect import found_effects, not_found
-from scara_ident.diagnosis.next_steps import next_steps
 from scara_ident.effects import Parameter, effects_named
 from scara_ident.effects.measurement import shifted
 from scara_ident.effects.position import Spring
+from scara_ident.inquiry.next_steps import next_steps
 from scara_ident.paper import table5_parameters
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import load_robot

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from scara_ident.diagnosis import model_selection
-from scara_ident.diagnosis.candidates import CandidateColumns
+from scara_ident.diagnosis.candidates.candidates import CandidateColumns
 from scara_ident.diagnosis.criteria import CRITERIA
+from scara_ident.diagnosis.evidence.outcome import Outcome, outcome_of
 from scara_ident.diagnosis.model_selection import (
     _asked_band,
     _band_beyond,
@@ -19,9 +20,8 @@ from scara_ident.diagnosis.model_selection import (
     select_model,
     told_where_quiet,
 )
-from scara_ident.diagnosis.outcome import Outcome, outcome_of
-from scara_ident.diagnosis.search import SearchTask, search
-from scara_ident.diagnosis.selection_step import SelectionStep, observed
+from scara_ident.diagnosis.selection.search import SearchTask, search
+from scara_ident.diagnosis.testing.selection_step import SelectionStep, observed
 from scara_ident.effects import CATALOGUE, Member
 from scara_ident.effects.elasticity import JointElasticity
 from scara_ident.effects.links import usual_link_inertia

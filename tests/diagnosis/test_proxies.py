@@ -10,12 +10,12 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from scara_ident.diagnosis.criteria import CRITERIA
-from scara_ident.diagnosis.evidence import coloured_shares
-from scara_ident.diagnosis.lack_of_fit import lack_of_fit
-from scara_ident.diagnosis.moments import examine_moments
-from scara_ident.diagnosis.outcome import Outcome, Unexplained, outcome_of
+from scara_ident.diagnosis.evidence.evidence import coloured_shares
+from scara_ident.diagnosis.evidence.outcome import Outcome, Unexplained, outcome_of
 from scara_ident.diagnosis.proxies import proxies
-from scara_ident.diagnosis.search import SearchTask
+from scara_ident.diagnosis.selection.search import SearchTask
+from scara_ident.diagnosis.testing.lack_of_fit import lack_of_fit
+from scara_ident.diagnosis.testing.moments import examine_moments
 from scara_ident.effects.friction import AsymmetricFriction, FrictionCoupling
 from scara_ident.effects.measurement import TimeDelay, shifted
 from scara_ident.effects.position import Spring

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from scara_ident.diagnosis.criteria import CRITERIA
-from scara_ident.diagnosis.evidence import Evidence
-from scara_ident.diagnosis.held_out_gain import HeldOutGain
+from scara_ident.diagnosis.evidence.evidence import Evidence
+from scara_ident.diagnosis.evidence.standing_lines import StandingLine
+from scara_ident.diagnosis.held_out.gain import HeldOutGain
+from scara_ident.diagnosis.held_out.validation import validated
 from scara_ident.diagnosis.model_selection import select_model
-from scara_ident.diagnosis.search import SearchTask
-from scara_ident.diagnosis.standing_lines import StandingLine
-from scara_ident.diagnosis.validation import validated
+from scara_ident.diagnosis.selection.search import SearchTask
 from scara_ident.diagnosis.verdict import verdict_of, weighed_evidence
 from scara_ident.diagnosis.work import searching
 from scara_ident.progress import Work, silent

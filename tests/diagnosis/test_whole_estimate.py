@@ -10,12 +10,12 @@ import pytest
 
 from scara_ident.arrays import Array
 from scara_ident.diagnosis import Diagnosis, diagnose
-from scara_ident.diagnosis.candidates import Candidate, CandidateColumns
+from scara_ident.diagnosis.candidates.candidates import Candidate, CandidateColumns
 from scara_ident.diagnosis.criteria import CRITERIA
-from scara_ident.diagnosis.effect_parameters import physical_parameters
-from scara_ident.diagnosis.nonlinear_fit import tune
-from scara_ident.diagnosis.search import scene_of
-from scara_ident.diagnosis.selection_step import SelectionStep, observed_at_every_sample
+from scara_ident.diagnosis.fitting.effect_parameters import physical_parameters
+from scara_ident.diagnosis.fitting.nonlinear_fit import tune
+from scara_ident.diagnosis.selection.search import scene_of
+from scara_ident.diagnosis.testing.selection_step import SelectionStep, observed_at_every_sample
 from scara_ident.effects import EffectTerm, Member, effects_named
 from scara_ident.effects.drift import WarmUp
 from scara_ident.effects.measurement import shifted

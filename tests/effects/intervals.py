@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 
-from scara_ident.diagnosis.search import scene_of
+from scara_ident.diagnosis.selection.search import scene_of
 from scara_ident.effects import Scene
 from scara_ident.estimation.least_squares import wls
 from scara_ident.estimation.observations import Observations, observe

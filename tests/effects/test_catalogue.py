@@ -84,10 +84,10 @@ def sources(*rooms: str):
     return {file: file.read_text() for room in rooms for file in sorted((package / room).rglob("*.py"))}
 
 
-def test_report_and_diagnosis_name_no_effect_and_import_no_family():
+def test_report_diagnosis_and_inquiry_name_no_effect_and_import_no_family():
     names = re.compile(rf"\b({'|'.join(effect.name for effect in CATALOGUE)})\b")
     families = {type(effect).__module__ for effect in CATALOGUE}
-    for file, text in sources("report", "diagnosis").items():
+    for file, text in sources("report", "diagnosis", "inquiry").items():
         code = re.sub(r"#.*", "", text)
         assert not names.search(code), f"{file}: {names.search(code)}"
         assert not [module for module in families if f"{module} import" in code], file

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from scara_ident.diagnosis.criteria import CRITERIA
-from scara_ident.diagnosis.effect_parameters import told_size
+from scara_ident.diagnosis.fitting.effect_parameters import told_size
 from scara_ident.effects import Member, Parameter, Scene, Signals
 from scara_ident.effects.elasticity import Backlash, JointElasticity
 from scara_ident.effects.links import lagging, usual_link_inertia

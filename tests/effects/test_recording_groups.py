@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from scara_ident.diagnosis.search import scene_of
+from scara_ident.diagnosis.selection.search import scene_of
 from scara_ident.effects import Scene
 from scara_ident.effects.payload import PayloadOfRecordings
 from scara_ident.effects.recording_groups import groups_by_torque, inverse_of

@@ -8,12 +8,12 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from scara_ident.diagnosis.answerability import Inquiry, inquire, known_rows
-from scara_ident.diagnosis.questions import Question, questions
 from scara_ident.excitation.curves import make_basis
 from scara_ident.excitation.judge import GLANCE_RATE, Judge
 from scara_ident.excitation.limits import limits_of
-from tests.diagnosis.asked import open_diagnosis
+from scara_ident.inquiry.answerability import Inquiry, inquire, known_rows
+from scara_ident.inquiry.questions import Question, questions
+from tests.inquiry.asked import open_diagnosis
 
 
 @lru_cache

@@ -7,18 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scara_ident.diagnosis.answerability import inquire, known_rows
-from scara_ident.diagnosis.candidates import Candidate, CandidateColumns
-from scara_ident.diagnosis.questions import Kind, Question, Suspect, questions
+from scara_ident.diagnosis.candidates.candidates import Candidate, CandidateColumns
 from scara_ident.effects import Member
 from scara_ident.effects.periodic import PERIODS_COVERED, TorqueRipple
 from scara_ident.estimation.information import merge
 from scara_ident.estimation.observations import observe
 from scara_ident.excitation.promise import SURE, rows_in_blocks, told
 from scara_ident.identification.usable import usable_in_bands
+from scara_ident.inquiry.answerability import inquire, known_rows
+from scara_ident.inquiry.questions import Kind, Question, Suspect, questions
 from scara_ident.motion.motion import Motion
-from tests.diagnosis.asked import open_diagnosis, small_runs
 from tests.diagnosis.made import BANDS, multisine
+from tests.inquiry.asked import open_diagnosis, small_runs
 
 
 def wide_motion(share: float = 1.0) -> Motion:

@@ -8,9 +8,7 @@ import numpy as np
 import pytest
 
 from scara_ident.diagnosis import diagnose
-from scara_ident.diagnosis.answerability import inquire, known_rows
-from scara_ident.diagnosis.candidates import CandidateColumns
-from scara_ident.diagnosis.questions import Question, questions
+from scara_ident.diagnosis.candidates.candidates import CandidateColumns
 from scara_ident.effects.position import Spring
 from scara_ident.effects.tilt import BaseTilt
 from scara_ident.errors import ScaraIdentError, UsageError
@@ -18,10 +16,12 @@ from scara_ident.estimation.observations import observe
 from scara_ident.excitation import Effort, design_excitation, excitation_dict, limits_of
 from scara_ident.excitation.promise import told
 from scara_ident.identification.usable import usable_in_bands
+from scara_ident.inquiry.answerability import inquire, known_rows
+from scara_ident.inquiry.questions import Question, questions
 from scara_ident.simulation import ReferenceMotion
-from tests.diagnosis.asked import PAIR, open_diagnosis, recorded, small_runs
 from tests.diagnosis.made import BANDS
 from tests.excitation.designs import hurry
+from tests.inquiry.asked import PAIR, open_diagnosis, recorded, small_runs
 
 EFFORT = Effort(starts=1, rounds=0, seed=2, processes=1)
 

@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from scara_ident.diagnosis.held_out_gain import HeldOutGain
+from scara_ident.diagnosis.held_out.gain import HeldOutGain
 from scara_ident.errors import ScaraIdentError
 from scara_ident.export import exported
 from scara_ident.export.exported import export_model, write_exported

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from scara_ident.diagnosis.tentative import TentativeEffect
+from scara_ident.diagnosis.selection.tentative import TentativeEffect
 from scara_ident.estimation.run_variation import JointVariation, RunVariation
 from scara_ident.identification.events import Event
 from scara_ident.report.diagnosis import diagnosis_dict

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from scara_ident.diagnosis import diagnose
-from scara_ident.diagnosis.effect_parameters import RotorInertia
-from scara_ident.diagnosis.held_out_gain import HeldOutGain
-from scara_ident.diagnosis.next_steps import next_steps
-from scara_ident.diagnosis.outcome import Unexplained
-from scara_ident.diagnosis.tentative import TentativeEffect
+from scara_ident.diagnosis.evidence.outcome import Unexplained
+from scara_ident.diagnosis.fitting.effect_parameters import RotorInertia
+from scara_ident.diagnosis.held_out.gain import HeldOutGain
+from scara_ident.diagnosis.selection.tentative import TentativeEffect
 from scara_ident.effects import Parameter
 from scara_ident.effects.position import Spring
 from scara_ident.estimation.run_offsets import rms_of
+from scara_ident.inquiry.next_steps import next_steps
 from scara_ident.report.diagnosis import diagnosis_dict
 from scara_ident.report.diagnosis_words import quantity, sentences
 from scara_ident.robot.robot import load_robot

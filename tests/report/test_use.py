@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scara_ident.diagnosis.held_out_gain import HeldOutGain
+from scara_ident.diagnosis.held_out.gain import HeldOutGain
 from scara_ident.report.use import _cost_said, sentences, total, use_dict
 from scara_ident.simulation import parse_effect, virtual_arm
 from scara_ident.use import Use

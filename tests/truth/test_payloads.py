@@ -8,9 +8,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from scara_ident.diagnosis.candidates import Candidate
+from scara_ident.diagnosis.candidates.candidates import Candidate
 from scara_ident.diagnosis.diagnose import diagnose
-from scara_ident.diagnosis.selection_step import model_with
+from scara_ident.diagnosis.testing.selection_step import model_with
 from scara_ident.effects import Member, effects_named
 from scara_ident.effects.payload import PayloadOfRecordings
 from scara_ident.estimation.least_squares import wls

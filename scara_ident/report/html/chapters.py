@@ -9,7 +9,7 @@ from itertools import chain
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.diagnose import Diagnosis
 from scara_ident.diagnosis.found_effect import FoundEffect
-from scara_ident.diagnosis.selection_step import observed_at_every_sample
+from scara_ident.diagnosis.testing.selection_step import observed_at_every_sample
 from scara_ident.effects.parameters import OWN, View
 from scara_ident.report.traces import Trace, traces
 

@@ -10,9 +10,9 @@ from typing import Any
 
 from scara_ident.diagnosis.diagnose import Diagnosis
 from scara_ident.diagnosis.found_effect import FoundEffect
-from scara_ident.diagnosis.held_out_gain import HeldOutGain, words_of
-from scara_ident.diagnosis.lack_of_fit import LackOfFit
-from scara_ident.diagnosis.next_steps import next_steps
+from scara_ident.diagnosis.held_out.gain import HeldOutGain, words_of
+from scara_ident.diagnosis.testing.lack_of_fit import LackOfFit
+from scara_ident.inquiry.next_steps import next_steps
 from scara_ident.manners import several
 from scara_ident.report.diagnosis import diagnosis_dict, intervals
 from scara_ident.report.doubts import parted

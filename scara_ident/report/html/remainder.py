@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.diagnosis.outcome import Unexplained
+from scara_ident.diagnosis.evidence.outcome import Unexplained
 from scara_ident.report.bins import binned_means, middle_range
 from scara_ident.report.html.blocks import Group
 from scara_ident.report.html.residual import scatter

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scara_ident.diagnosis.outcome import Unexplained
+from scara_ident.diagnosis.evidence.outcome import Unexplained
 from scara_ident.report.html.remainder import PAIR_BINS, remainder_group, signal_of
 from scara_ident.report.plot import Line, Matrix
 from scara_ident.robot.robot import load_robot

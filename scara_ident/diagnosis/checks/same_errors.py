@@ -1,0 +1,24 @@
+"""Whether two models leave as much, but for what chance or the noise of the positions makes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from scara_ident.diagnosis.checks.noise_check import noise_left
+from scara_ident.diagnosis.testing.acceptance import Decision
+from scara_ident.diagnosis.testing.moments import moments_told
+from scara_ident.diagnosis.testing.selection_step import SelectionStep
+
+
+def same(own: tuple[SelectionStep, Decision], other: tuple[SelectionStep, Decision]) -> bool:
+    """Whether the errors of two models, each a candidate beside a step, differ by no more than chance or noise makes.
+
+    What either lacks is the same in every repetition of a motion: these count as one.
+    """
+    worse = np.bincount(moments_told(own[0])[2], other[1].examination.left - own[1].examination.left)
+    difference, least = float(np.sum(worse)), own[0].criteria.alike * float(np.sqrt(len(worse) * np.var(worse)))
+    if abs(difference) < least:
+        return True
+    # The noise of the positions is in the columns of one more than in those of the other.
+    grown, own_grown = (noise_left(step, decision.candidate) for step, decision in (other, own))
+    return abs(difference - grown + own_grown) < least

@@ -1,0 +1,319 @@
+"""A last look at the effects found, each beside all others: those that do not stand it are not believed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from scara_ident.arrays import Array
+from scara_ident.diagnosis.candidates.candidates import Candidate
+from scara_ident.diagnosis.checks.noise_check import BY_NOISE, made_by_noise, noise_objection, within_a_step
+from scara_ident.diagnosis.checks.remainder_check import remainder_objection
+from scara_ident.diagnosis.checks.same_errors import same
+from scara_ident.diagnosis.checks.variation_check import variation_objection
+from scara_ident.diagnosis.fitting.effect_parameters import Coefficients, physical_parameters, told_size
+from scara_ident.diagnosis.selection.choice import fitted_with
+from scara_ident.diagnosis.selection.search import Search
+from scara_ident.diagnosis.testing.acceptance import Decision, hopeless
+from scara_ident.diagnosis.testing.candidate_tests import Examination
+from scara_ident.diagnosis.testing.cluster_test import significance
+from scara_ident.diagnosis.testing.moments import examine_moments
+from scara_ident.diagnosis.testing.selection_step import SelectionStep, best_of_each
+from scara_ident.effects import Parameter
+from scara_ident.estimation.noise_bias import noisy
+from scara_ident.estimation.run_variation import LEAST_RUNS
+
+
+def unsettled(found: Search, weights: Array) -> list[Decision]:
+    """Return the decisions on effects in the model that do not stand beside the others, with why.
+
+    When an effect came in, others that came later were still missing, whose torque it may have stood for.
+
+    Parameters
+    ----------
+    weights : ndarray, shape (n,)
+        Of each joint's rows in the last fit.
+    """
+    step = replace(found.step, weights=weights)
+    if not step.chosen:
+        return []
+    # Whether runs that differ make it is asked of it alone, on rows that weigh them as noise.
+    coefficients = physical_parameters(step, of_runs=False, of_noise=False).coefficients
+    noise = noisy(step.observations.data)
+    free = [noise and bool(item.effect.nonlinear) and not item.effect.together for item in step.chosen]
+    moved = physical_parameters(step, of_runs=False).coefficients if any(free) else coefficients
+    # One of several that act together may mend what another lacks: then scatter alone does not say how unsure it is.
+    sizes = physical_parameters(step).effects if len(step.scene.together) > 1 else ()
+    result = []
+    for place, (candidate, own) in enumerate(zip(step.chosen, coefficients, strict=True)):
+        beside = step.without(place)
+        (decision,) = beside.judge([candidate])
+        why = None if decision.accepted else decision.why
+        least, essential = step.criteria.least_final_size, candidate.effect.essential(step.scene, candidate.member)
+        why = why or uncertain(own, decision.examination, essential, least)
+        if why is None and free[place]:
+            why = _moved_by_noise(moved[place], decision.examination, essential, least)
+        if why is None and sizes and candidate.effect.together:
+            why = _unsized(step, candidate, sizes[place])
+        small = candidate.effect.negligible(step.scene, candidate.member, own.at_least(least))
+        why = why or (small and f"within its uncertainty {small}")
+        why = why or noise_objection(beside, decision)
+        why = why or variation_objection(beside, decision, step.criteria.least_gain)
+        why = why or remainder_objection(beside, decision)
+        why = why or _repeated(beside, decision)
+        if why is not None:
+            result.append(decision.refused(why))
+    return result
+
+
+def _moved_by_noise(own: Coefficients, examination: Examination, essential: slice, least: float) -> str | None:
+    """Say so where the noise of the positions moves an effect by as much as it is, with all its parameters free.
+
+    With these held, `noise_objection` sees less: what of a size lies where no row is, such as that of friction near rest behind a coarse
+    encoder, goes to any value with them.
+
+    Parameters
+    ----------
+    own : Coefficients
+        With what the noise does in their covariance.
+    examination, essential, least
+        See `uncertain`.
+    """
+    p_value = _chance(own, examination, essential)
+    if p_value <= _of_normal(least):
+        return None
+    return f"{BY_NOISE} moves its size by as much once its other parameters are free: p = {p_value:.1e}"
+
+
+def _unsized(step: SelectionStep, candidate: Candidate, sizes: Mapping[str, Parameter]) -> str | None:
+    """Say so where the size of one of several effects that act together is not told: it may mend what another lacks."""
+    if told_size(candidate.effect, sizes, step.criteria.least_size):
+        return None
+    return "its size is within its uncertainty beside those that it acts with, of which it may mend what they lack"
+
+
+def _repeated(step: SelectionStep, decision: Decision) -> str | None:
+    """Say so where only repetitions make an effect significant: what a model lacks repeats with the motion as well."""
+    data, criteria = step.observations.data, step.criteria
+    motions = len(data.trajectories)
+    if motions == len(data.recordings) and not any(data.periods):
+        return None
+    # Of one motion alone, no other says otherwise: it counts as recorded once. Else what hardly leaves anything stands for
+    # nothing that repeats.
+    if motions > 1 and decision.gain >= criteria.nearly_all:
+        return None
+    p_value = examine_moments(step, decision.candidate).p_value
+    if p_value <= (criteria.significant if motions > 1 else criteria.family_error / step.tried):
+        return None
+    return f"what a model lacks repeats with the motion: with repetitions counted once p = {p_value:.1e}"
+
+
+def outdone(found: Search, weights: Array, refused: Sequence[Decision]) -> list[Decision]:
+    """Return the decisions on effects in whose place one that is not believed does as well, with why.
+
+    What was refused may have been there all the same, and what is found without it then stands for it.
+
+    Parameters
+    ----------
+    found : Search
+        Without the effects that are not believed.
+    weights : ndarray, shape (n,)
+        See `unsettled`.
+    refused : sequence of Decision
+        On the effects that are not believed.
+    """
+    step = replace(found.step, weights=weights)
+    # What turns within a step of the encoder is not there: it mends friction's sign, as some of what is there does too.
+    rivals = [item.candidate for item in refused if within_a_step(step, item.candidate) is None]
+    result = []
+    for place, candidate in enumerate(step.chosen if rivals else ()):
+        beside = step.without(place)
+        own, *others = beside.judge([candidate, *rivals])
+        enough = step.criteria.least_share * own.examination.held_out
+        best = max(others, key=lambda item: item.examination.held_out)
+        if best.examination.held_out >= enough:
+            result.append(own.refused(f"{best.label}, which is not believed, does as well in its place"))
+    return result
+
+
+def beaten_by_its_like(found: Search, weights: Array) -> list[Decision]:
+    """Return the decisions on effects in whose place the same of another joint explains more by more than chance, with why.
+
+    Of those that act together one stands for another, and a search believes the one that its tests let in, by however little.
+    Coarse fits hardly tell them apart, so that all are fitted to the end here.
+
+    Parameters
+    ----------
+    weights : ndarray, shape (n,)
+        See `unsettled`.
+    """
+    step, criteria = replace(found.step, weights=weights), found.step.criteria
+    labels = {item.label(step.scene) for item in step.chosen}
+    result = []
+    for place, candidate in enumerate(step.chosen):
+        alike = [
+            item.candidate
+            for item in found.decisions
+            if item.candidate.effect == candidate.effect and item.label not in labels
+        ]
+        if not candidate.effect.together or not alike:
+            continue
+        beside = step.without(place)
+        own, *others = beside.judge([candidate, *alike])
+        enough = criteria.near_confounder * own.examination.held_out
+        near = [item for item in best_of_each(others).values() if item.examination.held_out > enough]
+        near.sort(key=lambda item: -item.examination.held_out)
+        for item in near[: criteria.most_fitted]:
+            rival, decision = fitted_with(beside, item.candidate)
+            less = float(np.sum(own.examination.left) - np.sum(decision.examination.left))
+            if less > 0.0 and not same((beside, own), (rival, decision)):
+                result.append(own.refused(f"{item.label} explains more in its place"))
+                break
+    return result
+
+
+def beaten_by_impossible(found: Search, weights: Array) -> list[Decision]:
+    """Return the decisions on effects in whose place one that no arm has explains more, with why.
+
+    It explains much beside them too: what the arm has is like that one, is none of the catalogue, and they stand for it.
+
+    Parameters
+    ----------
+    weights : ndarray, shape (n,)
+        See `unsettled`.
+    """
+    step, criteria = replace(found.step, weights=weights), found.step.criteria
+    rivals = [
+        item
+        for item in best_of_each(found.decisions).values()
+        if item.examination.p_value * found.tried <= criteria.family_error
+        and item.gain >= criteria.least_gain
+        and hopeless(item, found.scene, criteria) is not None
+    ]
+    result = []
+    for place, candidate in enumerate(step.chosen if rivals else ()):
+        near = [item.candidate for item in rivals if item.candidate.member.joint == candidate.member.joint]
+        if near:
+            beside = step.without(place)
+            own, *others = beside.judge([candidate, *near])
+            # What is believed has its best nonlinear parameters.
+            best = max(beside.refine(others), key=lambda item: item.examination.held_out)
+            if best.examination.held_out > own.examination.held_out:
+                result.append(own.refused(f"{best.label} explains more in its place, and is none: {best.why}"))
+    return result
+
+
+def suspected(found: Search, weights: Array) -> list[Decision]:
+    """Return the decisions on what would be let in beside the effects found, did the recordings hold enough of it.
+
+    Parameters
+    ----------
+    weights : ndarray, shape (n,)
+        See `unsettled`.
+    """
+    step = replace(found.step, weights=weights, tried=found.tried + len(found.doubtful))
+    best = best_of_each([item for item in step.judge(found.doubtful) if item.accepted])
+    return [item for item in best.values() if not (noise_objection(step, item) or variation_objection(step, item))]
+
+
+def left_open(found: Search, weights: Array, demoted: Sequence[Decision] = ()) -> list[Decision]:
+    """Return the decisions on what is not believed, though it is no noise, with that in words.
+
+    Beside the effects found it would remove as much as is asked and is worth a look, and neither the noise of the positions
+    makes it nor what runs were seen to differ by, nor what may be left of a correction of the data: what is left is not shown to be
+    noise, whatever it looks like.
+
+    Parameters
+    ----------
+    weights : ndarray, shape (n,)
+        See `unsettled`.
+    demoted : sequence of Decision, optional
+        On effects that the search had found and did without in the end; what came in since may have made them nothing.
+    """
+    # What noise or runs would make is asked no more than it is itself: it need not be sure of it to be possible.
+    of_one = replace(found.step.criteria, family_error=found.step.criteria.significant)
+    step = replace(found.step, weights=weights, criteria=of_one)
+    differing = len(step.observations.data.recordings) >= LEAST_RUNS
+    labels = {item.label(found.scene) for item in found.chosen}
+    gone = [item for item in demoted if item.label not in labels]
+    again = step.judge([item.candidate for item in gone])
+    open_ = [now.refused(item.why) for item, now in zip(gone, again, strict=True) if now.accepted or now.tentative]
+    others = {item.label: item for item in best_of_each(found.decisions).values() if item.tentative}
+    result = []
+    for item in (others | {item.label: item for item in open_}).values():
+        p_value = item.examination.p_value * found.tried
+        if p_value > step.criteria.significant:
+            continue
+        if within_a_step(step, item.candidate) or made_by_noise(step, item) or remainder_objection(step, item):
+            continue
+        if not (differing and variation_objection(step, item)):
+            result.append(
+                item.refused(
+                    f"{item.label} would remove {item.gain:.0%} of it (p = {p_value:.1e} over all tried): {item.why}"
+                )
+            )
+    return result
+
+
+def superfluous(found: Search, weights: Array, others: Sequence[Decision]) -> list[Decision]:
+    """Return the decisions on effects in whose place one that is suspected explains more, so that they add nothing, with why.
+
+    Parameters
+    ----------
+    weights : ndarray, shape (n,)
+        See `unsettled`.
+    others : sequence of Decision
+        Of what is suspected, see `suspected`.
+    """
+    step, result = replace(found.step, weights=weights), []
+    for other in others:
+        what = other.candidate.effect.description(step.scene, other.candidate.member)
+        with_it = replace(step, chosen=(*step.chosen, other.candidate))
+        for place, candidate in enumerate(step.chosen):
+            own, rival = step.without(place).judge([candidate, other.candidate])
+            (left,) = with_it.without(place).judge([candidate])
+            if rival.examination.held_out > own.examination.held_out and not left.accepted:
+                result.append(
+                    own.refused(f"{what}, of which the recordings hold too little, explains more in its place")
+                )
+    return result
+
+
+def uncertain(own: Coefficients, examination: Examination, essential: slice, least: float) -> str | None:
+    """Say so where an effect's coefficients are not beyond their final uncertainty.
+
+    That is the uncertainty beside all that was found, nonlinear parameters free. The
+    coefficients are asked together, by Wald's statistic with the degrees of freedom of blocks (`significance`); none is
+    all of them zero, whatever the physical parameters are then, and phases, orders and times do not count.
+
+    Parameters
+    ----------
+    examination : Examination
+        Of the effect beside all others.
+    essential : slice
+        The coefficients that are asked, see `Effect.essential`.
+    least : float
+        Standard deviations that one coefficient would have to lie from zero, beyond which many blocks let so few by.
+    """
+    p_value = _chance(own, examination, essential)
+    if p_value <= _of_normal(least):
+        return None
+    return f"beside all that was found its size is within its uncertainty: p = {p_value:.1e}"
+
+
+def _chance(own: Coefficients, examination: Examination, essential: slice) -> float:
+    """Return the probability that coefficients which are none would be as large, see `uncertain`."""
+    value, covariance = own.value[essential], own.covariance[essential, essential]
+    if not np.array_equal(examination.tested, examination.value):
+        # The freedom is that of weighted blocks, which are less sure.
+        covariance = covariance + examination.covariance[essential, essential]
+    return significance(value, covariance, examination.freedom, examination.products[essential, essential])
+
+
+def _of_normal(stds: float) -> float:
+    """Return the probability that a normal variable lies so many standard deviations off, either way."""
+    from scipy.special import erfc
+
+    return float(erfc(stds / 2.0**0.5))

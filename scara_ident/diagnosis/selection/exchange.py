@@ -1,0 +1,137 @@
+"""Exchanging an effect for one that explains more in its place: what came in early was fitted without what came later."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+
+from scara_ident.diagnosis.candidates.candidates import Candidate
+from scara_ident.diagnosis.checks.same_errors import same
+from scara_ident.diagnosis.selection.choice import fitted_beside, fitted_with, objection
+from scara_ident.diagnosis.testing.acceptance import Decision
+from scara_ident.diagnosis.testing.candidate_tests import held_out_gains
+from scara_ident.diagnosis.testing.selection_step import SelectionStep, best_of_each
+from scara_ident.effects import Scene
+
+# Of what the effect removes, less than this share more or less is rounding: two models of one span leave the same.
+ROUNDING = 1e-9
+# Columns that follow the base model's estimate instead of the last one gain at least this share of what they would.
+LEAST_AT_FIRST = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Exchange:
+    """An effect in the place of another.
+
+    Attributes
+    ----------
+    place : int
+        Of the effect that goes, among those chosen.
+    decision : Decision
+        On the effect that comes.
+    scene : Scene
+        To go on with.
+    saved : float
+        Weighted squared residual that it leaves less.
+    """
+
+    place: int
+    decision: Decision
+    scene: Scene
+    saved: float
+
+
+def best_exchange(
+    step: SelectionStep, pool: Sequence[Candidate], first: Scene, refused: Collection[str] = ()
+) -> Exchange | None:
+    """Return the exchange that explains most more, or as much with fewer effects, all else fitted with it; None where none does.
+
+    Parameters
+    ----------
+    step : SelectionStep
+        The model with all that came in.
+    pool : sequence of Candidate
+        All that may come.
+    first : Scene
+        Where the columns of the pool are at hand.
+    refused : collection of str, optional
+        Labels of what is not to be tried.
+    """
+    found = []
+    held = {item.label(step.scene) for item in step.chosen} | set(refused)
+    able = [item for item in pool if not item.corrects_data and item.label(step.scene) not in held]
+    count = cache(lambda: len(needed(step)))
+    for place, item in enumerate(step.chosen):
+        beside = step.without(place)
+        (own,) = beside.judge([item])
+        least = ROUNDING * float(np.sum(beside.model.squares))
+        for other, decision in _fitted_rivals(beside, own, able, first):
+            saved = float(np.sum(own.examination.left) - np.sum(decision.examination.left))
+            saved = saved if abs(saved) > least else 0.0
+            alike = same((beside, own), (other, decision))
+            # What does as well with fewer others is the better explanation of the two.
+            better = _fewer(count, other, decision) if alike else saved > 0.0
+            if better and objection(other, decision) is None:
+                found.append(Exchange(place, decision, other.scene, saved))
+    return max(found, key=lambda each: each.saved, default=None)
+
+
+def needed(step: SelectionStep) -> tuple[Candidate, ...]:
+    """Drop, one at a time, effects that the others have made superfluous."""
+    while len(step.chosen) > 1:
+        decisions = [step.without(k).judge([item])[0] for k, item in enumerate(step.chosen)]
+        weakest = min(range(len(decisions)), key=lambda k: decisions[k].gain)
+        if decisions[weakest].accepted:
+            break
+        step = step.without(weakest)
+    return step.chosen
+
+
+def near_in_place(step: SelectionStep, found: Decision, pool: Sequence[Candidate], first: Scene) -> list[Decision]:
+    """Return the best grid point of each of those that remove nearly as much in the place of an effect.
+
+    Parameters
+    ----------
+    step : SelectionStep
+        The model without the effect.
+    found : Decision
+        On the effect beside it.
+    first : Scene
+        Where the columns of the pool are at hand.
+    """
+    criteria, effect = step.criteria, found.candidate.effect
+    least = criteria.near_confounder * found.examination.held_out
+
+    def enough(candidates: list[Candidate], columns: Scene, asked: float) -> list[Candidate]:
+        gained = held_out_gains(step.model, step.rows_at_hand(columns, candidates), criteria)
+        return [item for item, gain in zip(candidates, gained, strict=True) if gain > asked]
+
+    # By the columns at hand first: most come nowhere near, and need no others. But what the effect itself would do on
+    # another joint depends on the model as it does here.
+    alike = [item for item in pool if item.effect.name == effect.name]
+    others = enough([item for item in pool if item.effect.name != effect.name], first, LEAST_AT_FIRST * least)
+    return list(best_of_each(step.judge(enough([*alike, *others], step.scene, least))).values())
+
+
+def _fitted_rivals(
+    beside: SelectionStep, own: Decision, pool: Sequence[Candidate], first: Scene
+) -> list[tuple[SelectionStep, Decision]]:
+    """Return those that come near an effect in its place once they are refined, with all else fitted with them."""
+    criteria = beside.criteria
+    near = near_in_place(beside, own, pool, first)
+    by_fit = fitted_beside(beside, [item for item in near if item.candidate.effect.fitted_first], 0.0, None)
+    rest = [item for item in near if item.accepted and not item.candidate.effect.fitted_first]
+    rest.sort(key=lambda item: -item.examination.held_out)
+    enough = criteria.least_share * own.examination.held_out
+    refined = [item for item in beside.refine(rest[: criteria.most_refined]) if item.examination.held_out >= enough]
+    fitted = [*by_fit, *(fitted_with(beside, item.candidate) for item in refined)]
+    return [pair for pair in fitted if pair[1].accepted]
+
+
+def _fewer(count: Callable[[], int], other: SelectionStep, decision: Decision) -> bool:
+    """Whether fewer effects than a count are needed with another in the place of one."""
+    # Of two, the other one is needed beside one that does as well.
+    return len(other.chosen) > 1 and len(needed(replace(other, chosen=(*other.chosen, decision.candidate)))) < count()

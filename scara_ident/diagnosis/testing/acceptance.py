@@ -1,0 +1,168 @@
+"""Letting an effect in: every condition that it must meet, and the words for the one that it fails."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from scara_ident.diagnosis.candidates.candidates import Candidate
+from scara_ident.diagnosis.criteria import SelectionCriteria
+from scara_ident.diagnosis.testing.candidate_tests import Examination
+from scara_ident.effects import Scene
+from scara_ident.effects.effect import DOUBT_STDS
+
+
+@dataclass(frozen=True)
+class Decision:
+    """Whether a candidate may come in, and why.
+
+    Attributes
+    ----------
+    why : str
+        In words.
+    gain : float
+        What it removes on rows that it was not fitted to, as a share of that and what it leaves on its joint; see `gains`.
+    tentative : bool
+        Not accepted, but worth a look: an arm can have it, it helps as much as is asked, and these recordings are too few
+        or too alike to be sure.
+    as_no_arm : float
+        The gain, where it is significant and only the sign or the size is none that a real arm can have; 0 elsewhere. Something
+        that is no noise goes as this effect does.
+    """
+
+    candidate: Candidate
+    label: str
+    examination: Examination
+    accepted: bool
+    why: str
+    gain: float
+    tentative: bool = False
+    as_no_arm: float = 0.0
+
+    def refused(self, why: str) -> Decision:
+        """Return it as one that may be looked at, and not believed."""
+        return replace(self, accepted=False, tentative=True, why=why)
+
+
+def decide(
+    candidate: Candidate, examination: Examination, gain: float, scene: Scene, tried: int, criteria: SelectionCriteria
+) -> Decision:
+    """Decide on one candidate.
+
+    Parameters
+    ----------
+    gain : float
+        See `gains`.
+    tried : int
+        Candidates and scan points tried, for the correction of the p-value.
+    """
+    unseen = _unseen(examination, criteria) or _faint(examination, gain, criteria)
+    of_no_arm = _inadmissible(candidate, examination, scene)
+    impossible = _unseen(examination, criteria) or of_no_arm
+    small = impossible or _small(candidate, examination, scene, gain, criteria)
+    seldom = _seldom(candidate, examination, gain, criteria)
+    # The first reason that a person would give.
+    why = unseen or _insignificant(examination, tried, criteria) or small or seldom
+    sure = unseen is None and seldom is None and _insignificant(examination, tried, criteria) is None
+    as_no_arm = max(gain, 0.0) if sure and of_no_arm is not None else 0.0
+    if _wrong_sign(candidate, examination):
+        # The best that a real one can be is absent: nothing is removed, and nothing speaks for it.
+        examination, gain = replace(examination, p_value=1.0), min(gain, 0.0)
+    words = why or f"removes {gain:.1%} of the squared residual on data that it was not fitted to"
+    tentative = why is not None and small is None and examination.p_value <= criteria.significant
+    return Decision(candidate, candidate.label(scene), examination, why is None, words, gain, tentative, as_no_arm)
+
+
+def _wrong_sign(candidate: Candidate, examination: Examination) -> bool:
+    """Whether the only coefficient is, beyond doubt, on the side of zero where no real one can be."""
+    names, value = candidate.effect.coefficients, examination.value
+    if len(names) != 1 or len(value) != 1 or not names[0].positive:
+        return False
+    return bool(value[0] < -DOUBT_STDS * float(np.sqrt(max(examination.covariance[0, 0], 0.0))))
+
+
+def _unseen(examination: Examination, criteria: SelectionCriteria) -> str | None:
+    if examination.outside < criteria.absorbed:
+        return "the model absorbs it: these recordings cannot show it"
+    return None
+
+
+def _faint(examination: Examination, gain: float, criteria: SelectionCriteria) -> str | None:
+    """Say so where the model's own small errors may make it; they do not make most of what is left lie along one column."""
+    if examination.outside >= criteria.least_outside or gain >= criteria.dominant:
+        return None
+    return f"only {examination.outside:.1e} of it lies outside the model, whose own small errors may look like it"
+
+
+def _inadmissible(candidate: Candidate, examination: Examination, scene: Scene) -> str | None:
+    std = np.sqrt(np.clip(np.diag(examination.covariance), 0.0, None))
+    # Judged beside the parameters that the model has once the candidate is in it.
+    after = replace(scene, value=examination.model_value[: len(scene.value)])
+    return candidate.effect.inadmissible(after, candidate.member, examination.value, std)
+
+
+def hopeless(decision: Decision, scene: Scene, criteria: SelectionCriteria) -> str | None:
+    """Say why these recordings cannot show a candidate, or no arm can have it with the coefficients found; else None."""
+    found = decision.examination
+    return (
+        _unseen(found, criteria)
+        or _faint(found, decision.gain, criteria)
+        or _inadmissible(decision.candidate, found, scene)
+    )
+
+
+def _small(
+    candidate: Candidate, examination: Examination, scene: Scene, gain: float, criteria: SelectionCriteria
+) -> str | None:
+    # What is taken out of the recordings is taken out however small it is, and however little it removes where it is not.
+    small = candidate.effect.negligible(scene, candidate.member, examination.value)
+    if small is not None and not candidate.corrects_data:
+        return small
+    if gain >= criteria.least_gain:
+        return None
+    least = f"below the detection limit: removes {max(gain, 0.0):.1%} of the squared residual, {criteria.least_gain:.0%} is asked"
+    if gain <= 0.0 or not candidate.corrects_data:
+        return least
+    if small is None:
+        return None
+    # Too small to speak of, it may still be more than the parameters' standard deviations say that these are off by.
+    settled = candidate.effect.settled(examination.value)
+    return None if not settled and displacement(examination) > 1.0 else least
+
+
+def displacement(examination: Examination) -> float:
+    """Return the mean square by which parameters are off without a candidate, in the standard deviations that they then have.
+
+    Over as many independent combinations of them as there are parameters. The model takes up all but
+    `Examination.outside` of the squares of a column, and with rows as sure throughout, those inside are to the coefficient's
+    own certainty as inside is to outside. Below 1 what they are off by is within what they are said to be unsure by.
+    """
+    tested, outside = examination.tested, examination.outside
+    if outside <= 0.0 or not np.all(np.isfinite(examination.covariance)):
+        return 0.0
+    squares = float(tested @ np.linalg.pinv(examination.covariance, hermitian=True) @ tested)
+    return squares * (1.0 - outside) / outside / max(1, len(examination.model_value))
+
+
+def _insignificant(examination: Examination, tried: int, criteria: SelectionCriteria) -> str | None:
+    alone, corrected = examination.p_value, examination.p_value * tried
+    if corrected <= criteria.family_error:
+        return None
+    # Worth a look by its own p-value: corrected, that may be 1, and no reader would see why to look.
+    if alone <= criteria.significant:
+        asked = f"{criteria.family_error / tried:.1e} is asked of one of so many"
+        return f"could be chance: one of {tried} candidates tried; p = {alone:.1e} of it alone, {asked}"
+    asked = f"{criteria.family_error:.1g} is asked"
+    return f"not significant: p = {min(corrected, 1.0):.1e} over the {tried} candidates tried, {asked}"
+
+
+def _seldom(candidate: Candidate, examination: Examination, gain: float, criteria: SelectionCriteria) -> str | None:
+    helps, voting = examination.votes
+    # What is taken out of the recordings is the mean of them, whatever they differ by: left in, others would stand for it.
+    if not voting or candidate.corrects_data or helps >= criteria.least_votes * voting:
+        return None
+    # Of few trajectories one may be where it hardly shows: all would be asked of three.
+    if gain >= criteria.dominant and voting - helps == 1 and helps > 1:
+        return None
+    return f"helps in only {helps} of {voting} trajectories that it was not fitted to"

@@ -1,0 +1,7 @@
+"""What recordings left open, and what rows not yet recorded would say of it."""
+
+from scara_ident.inquiry.answerability import Inquiry, inquire, inquiry_of
+from scara_ident.inquiry.next_steps import NextStep, next_steps
+from scara_ident.inquiry.questions import Question, questions
+
+__all__ = ["Inquiry", "NextStep", "Question", "inquire", "inquiry_of", "next_steps", "questions"]

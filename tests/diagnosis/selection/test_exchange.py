@@ -1,0 +1,130 @@
+"""What came in early goes again for what explains more in its place, and for nothing less."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from scara_ident.diagnosis.candidates.candidates import Candidate
+from scara_ident.diagnosis.checks.same_errors import same
+from scara_ident.diagnosis.selection.exchange import best_exchange, near_in_place, needed
+from scara_ident.effects import Member
+from scara_ident.effects.friction import AsymmetricFriction, Stribeck
+from scara_ident.effects.measurement import TimeDelay
+from scara_ident.effects.position import Spring
+from tests.diagnosis.made import Bent, Bump, exact_runs, searched, step_beside, with_torque
+
+SPRING, ASYMMETRIC = Candidate(Spring(), Member(0)), Candidate(AsymmetricFriction(), Member(0))
+STIFFNESS, DIFFERENCE = 0.08, 0.05
+
+
+def both(motion):
+    return STIFFNESS * (motion.q[0] - 1.57) + DIFFERENCE * np.abs(motion.v[0])
+
+
+class Mixture(Spring):
+    """A torque that is nearly that of a spring and of friction by direction together."""
+
+    name = "mixture"
+
+    def signal_columns(self, signals, member):
+        motion = signals.motion
+        return [both(motion) + 0.02 * np.sin(5.0 * motion.q[0])]
+
+
+MIXTURE = Candidate(Mixture(), Member(0))
+
+
+@pytest.fixture(scope="module")
+def runs():
+    return with_torque(exact_runs(), 0, both)
+
+
+def test_what_stood_for_two_effects_goes_once_one_of_them_is_in(runs):
+    step = step_beside(runs)
+    mixture, spring, asymmetric = step.judge([MIXTURE, SPRING, ASYMMETRIC])
+    assert mixture.gain > max(spring.gain, asymmetric.gain)
+    result = searched(runs, Mixture(), Spring(), AsymmetricFriction())
+    assert {item.label(result.scene) for item in result.chosen} == {"spring of joint1", "asymmetric_friction of joint1"}
+    assert [item.decision.label for item in result.steps] == [item.label(result.scene) for item in result.chosen]
+
+
+def test_the_exchange_says_what_it_saves_and_where_to_go_on(runs):
+    step = step_beside(runs, [SPRING, MIXTURE])
+    found = best_exchange(step, [SPRING, MIXTURE, ASYMMETRIC, Candidate(TimeDelay(), Member(None))], step.scene)
+    assert (found.place, found.decision.label) == (1, "asymmetric_friction of joint1")
+    right = replace(step, chosen=(SPRING, ASYMMETRIC))
+    assert found.saved == pytest.approx(float(np.sum(step.model.squares) - np.sum(right.model.squares)), rel=1e-6)
+    # The weights are those of a model without either: all but the noise's share of what was left is gone.
+    assert best_exchange(right, [SPRING, MIXTURE, ASYMMETRIC], step.scene) is None
+    assert best_exchange(step, [SPRING, MIXTURE, ASYMMETRIC], step.scene, ["asymmetric_friction of joint1"]) is None
+
+
+def test_what_does_as_well_or_comes_nowhere_near_takes_no_place():
+    runs = with_torque(exact_runs(size=0.3), 0, lambda motion: STIFFNESS * (motion.q[0] - 1.57))
+    bent = Candidate(Bent(), Member(0))
+    for chosen, other in ((SPRING, bent), (bent, SPRING)):
+        step = step_beside(runs, [chosen])
+        assert best_exchange(step, [other, ASYMMETRIC], step.scene) is None
+        beside = step.without(0)
+        own, rival = beside.judge([chosen, other])
+        assert same((beside, own), (beside, rival))
+        assert [item.label for item in near_in_place(beside, own, [other, ASYMMETRIC], step.scene)] == [rival.label]
+
+
+def test_another_place_of_the_same_effect_is_asked_by_the_columns_of_the_model_at_hand(monkeypatch, runs):
+    """A clearance of the wrong joint stayed: by the base model's columns that of the right one came nowhere near."""
+    step = step_beside(with_torque(exact_runs(), 0, lambda motion: np.exp(-(((motion.q[0] - 1.1) / 0.3) ** 2))))
+    grid = [Candidate(Bump(), item) for item in Bump().members(step.scene)]
+    (own,) = step.judge([Candidate(Bump(), Member(0, (1.1,)))])
+    asked = []
+    rows = type(step).rows
+    monkeypatch.setattr(
+        type(step), "rows", lambda self, scene, items: asked.append((scene, items)) or rows(self, scene, items)
+    )
+    first = replace(step.scene, value=0.0 * step.scene.value)
+    (near,) = near_in_place(step, own, [*grid, SPRING], first)
+    assert near.candidate.member.nonlinear == (1.0,)
+    assert [items for scene, items in asked if scene is first] == [[SPRING]]
+
+
+def test_an_effect_that_the_others_make_superfluous_is_dropped(runs):
+    """Backwards every effect is judged beside the others; one that nothing was planted for does not stay."""
+    extra = Candidate(Stribeck(), Member(0, (0.5,)))
+    assert needed(step_beside(runs, (SPRING, extra, ASYMMETRIC))) == (SPRING, ASYMMETRIC)
+
+
+class Shape(Spring):
+    """A torque of another shape for each name."""
+
+    def __init__(self, name, shape):
+        self.name, self.shape = name, shape
+
+    def __hash__(self):
+        return hash(self.name)
+
+    def __eq__(self, other):
+        return isinstance(other, Shape) and self.name == other.name
+
+    def signal_columns(self, signals, member):
+        return [self.shape(signals.motion)]
+
+
+def test_what_does_as_well_with_fewer_others_takes_the_place():
+    """A spring and a torque read too large were believed to be a counterbalance and four other effects (UR5)."""
+    runs = with_torque(exact_runs(), 0, lambda motion: 0.1 * (motion.q[0] - 1.57))
+    wrong = Candidate(Shape("wrong", lambda motion: motion.q[0] - 1.57 - 1.5 * np.sin(5.0 * motion.q[0])), Member(0))
+    mends = Candidate(Shape("mends", lambda motion: np.sin(5.0 * motion.q[0])), Member(0))
+    other = Candidate(Shape("other", lambda motion: np.cos(3.0 * motion.q[1])), Member(1))
+    runs = with_torque(runs, 1, lambda motion: 0.05 * np.cos(3.0 * motion.q[1]))
+    step = step_beside(runs, [wrong, mends, other])
+    beside = step.without(0)
+    own, spring = beside.judge([wrong, SPRING])
+    assert same((beside, own), (beside, spring))
+    assert len(needed(step)) == 3
+    found = best_exchange(step, [SPRING], step.scene)
+    assert (found.place, found.decision.label) == (0, "spring of joint1")
+    # Beside two that are both needed with either, it would change nothing.
+    assert best_exchange(step_beside(runs, [wrong, mends]), [SPRING], step.scene) is None
