@@ -228,19 +228,18 @@ def _compared(scales: Mapping[str, float] | None, robot: Robot, slight: Sequence
         spread = " to ".join(dict.fromkeys((f"{size.min():.2g}", f"{size.max():.2g}")))
         same = "those of the URDF" if spread == "1" else f"{spread} times the URDF's"
         return f"{said}. Torques of the bodies are {same}."
-    asked = "are effort_gain and effort_side right?" if geared else "is effort_gain right?"
+    asked = "are effort_gain and effort_side right" if geared else "is effort_gain right"
     # Of few joints it is not known whether it is all that are scaled.
     if _alike(scales.values()) and 2 * len(scales) > robot.n:
-        return f"{said}. All inertial parameters are {middle:.2g} of the URDF's: {asked}"
+        return f"{said}. All inertial parameters are {middle:.2g} of the URDF's: {asked}?"
     odd = ", ".join(
         f"{scale:.2g} times the URDF's on {joint}"
         for (joint, scale), fits in zip(scales.items(), usual, strict=True)
         if not fits
     )
-    if np.any(usual):
-        # A URDF is often right of the large links and has the small ones roughly.
-        asked = asked.replace("?", " there, or are the masses others?")
-    return f"{said}. Torques of the bodies are {odd}: {asked}"
+    # A URDF is often right of the large links and has the small ones roughly.
+    others = " there, or are the masses others" if np.any(usual) else ""
+    return f"{said}. Torques of the bodies are {odd}: {asked}{others}?"
 
 
 def _turned(turned: Sequence[str], friction: FrictionSides) -> str:

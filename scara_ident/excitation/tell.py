@@ -40,7 +40,7 @@ from scara_ident.threads import one_blas_thread
 DRAWN, CHANGED = 48, 60
 # Speeds of a drawn motion as shares of the limits, evenly in their logarithm; how often a joint stands still.
 SLOWEST, STILL = 0.03, 0.15
-# Shares of the limits of speeds at which motions that tell most of the parameters are searched.
+# Shares of the speeds that joints can have at which motions that tell most of the parameters are searched.
 PACES = (1.0, 0.3, 0.1)
 # Size of the first change, of 1 for another motion; it grows by this where a change helps and else shrinks by its fourth
 # root, so that one in five helps (Rechenberg 1973), and is at least so large.
@@ -76,8 +76,7 @@ def search_to_tell(
     judge = Judge(inquiry, task.bases[0], task.posture)
 
     def paced(share: float) -> Minimum | None:
-        slower = replace(task, limits=replace(task.limits, velocity=share * task.limits.velocity))
-        return from_random(within_grid(slower, COARSE, bounds), effort.seed, 0)
+        return from_random(within_grid(slowed(task, share), COARSE, bounds), effort.seed, 0)
 
     beside = [item.x for item in map_in_order(paced, PACES, effort.processes) if item is not None]
 
@@ -109,6 +108,11 @@ def search_to_tell(
     with one_blas_thread():
         x, times = verified_inside(fine, best.x)
     return Found(x, costs, times)
+
+
+def slowed(task: Task, share: float) -> Task:
+    """Return the task with joints at most at a share of the speed that they can have."""
+    return replace(task, limits=replace(task.limits, velocity=share * task.speed))
 
 
 def _left(starts: int, number: int) -> int:

@@ -15,12 +15,15 @@ from scara_ident.errors import ScaraIdentError, UsageError
 from scara_ident.estimation.observations import observe
 from scara_ident.excitation import Effort, design_excitation, excitation_dict, limits_of
 from scara_ident.excitation.promise import told
+from scara_ident.excitation.tell import slowed
 from scara_ident.identification.usable import usable_in_bands
 from scara_ident.inquiry.answerability import inquire, known_rows
 from scara_ident.inquiry.questions import Question, questions
+from scara_ident.robot.robot import load_robot
 from scara_ident.simulation import ReferenceMotion
 from tests.diagnosis.made import BANDS
 from tests.excitation.designs import hurry
+from tests.excitation.made import rigid_model, small_problem
 from tests.inquiry.asked import PAIR, open_diagnosis, recorded, small_runs
 
 EFFORT = Effort(starts=1, rounds=0, seed=2, processes=1)
@@ -104,6 +107,15 @@ def test_the_better_half_of_the_searches_goes_on_whatever_the_number_of_processe
     assert [(item.done, item.total) for item in said] == 2 * [(1, 3), (2, 3), (3, 3)]
     assert len(one.costs) == 2 and one.costs == two.costs
     assert np.array_equal(one.trajectories[0].coefficients, two.trajectories[0].coefficients)
+
+
+def test_a_slow_motion_is_slow_where_the_limit_is_out_of_reach_too():
+    robot = load_robot()
+    task = small_problem(rigid_model(robot), lengths=((8.0, 6),)).task
+    high = limits_of(robot, share=1.0, velocities={"joint1": 1000.0, "joint2": 0.1})
+    slow = slowed(replace(task, limits=high), 0.3)
+    half = 0.5 * (high.upper - high.lower)[0]
+    np.testing.assert_allclose(slow.limits.velocity, [0.3 * 2.0 * np.pi * (6 / 8.0) * half, 0.03])
 
 
 def test_goals_that_exclude_each_other_are_said(asked):
