@@ -11,6 +11,7 @@ import scara_ident
 from tests.shared import PATIENCE
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "status"), [(["--version"], 0), (["base", "--robot", "nowhere.yaml"], 2), (["nothing"], 2)]
 )

@@ -65,6 +65,7 @@ def test_what_the_diagnosis_came_to_is_told_in_a_line(tmp_path: Path):
         assert told_so_far(tmp_path) == f"So far: undecided, {said}; all of it in {tmp_path / 'report.html'}."
 
 
+@pytest.mark.slow
 def test_a_killed_run_is_gone_on_with_and_a_second_one_touches_nothing(
     folder: Path, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
 ):

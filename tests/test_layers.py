@@ -100,12 +100,14 @@ def within(found: dict[str, set[str]], room: str) -> dict[str, set[str]]:
     }
 
 
+@pytest.mark.slow
 def test_every_room_is_in_the_list():
     assert {name.split(".")[0] for name in modules(PACKAGE)} == set(ROOMS)
     for room, order in WITHIN.items():
         assert {name.split(".")[0] for name in within(graph(PACKAGE), room)} == set(order)
 
 
+@pytest.mark.slow
 def test_no_import_goes_up_or_round():
     found = graph(PACKAGE)
     assert sum(map(len, found.values())) > 300

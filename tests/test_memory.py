@@ -80,6 +80,7 @@ def test_an_allocation_past_the_limit_is_an_error_and_the_limit_ends_with_the_bl
     assert resource.getrlimit(resource.RLIMIT_AS) == before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["mat", "h5", "parquet", "csv"])
 def test_a_small_file_that_unpacks_to_gigabytes_is_refused(tmp_path: Path, kind: str):
     path = tmp_path / f"small.{kind}"
@@ -141,6 +142,7 @@ print(faults() * resource.getpagesize())
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="of glibc")
 def test_freed_memory_is_kept_for_the_next_arrays():
     # In processes of their own: what others have left in the heap of this one is given back at times.

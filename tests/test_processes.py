@@ -23,6 +23,7 @@ from scara_ident.threads import one_thread, side_by_side
 from tests.shared import PATIENCE
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("processes", [1, 2, 3])
 def test_results_do_not_depend_on_the_number_of_processes(processes: int):
     # A function that holds another cannot be sent to a process; a fork has it.
@@ -32,11 +33,13 @@ def test_results_do_not_depend_on_the_number_of_processes(processes: int):
     assert list(map_in_order(work, iter(range(7)), processes)) == [(k, k * k) for k in range(7)]
 
 
+@pytest.mark.slow
 def test_the_work_is_done_in_other_processes_where_there_may_be_several():
     assert os.getpid() not in set(map_in_order(lambda _: os.getpid(), range(4), 2))
     assert set(map_in_order(lambda _: os.getpid(), range(4), 1)) == {os.getpid()}
 
 
+@pytest.mark.slow
 def test_as_many_items_as_workers_go_to_one_each():
     assert len(set(map_in_order(lambda _: os.getpid(), range(2), 2))) == 2
 
@@ -46,6 +49,7 @@ def test_without_fork_the_items_are_worked_on_here(monkeypatch: pytest.MonkeyPat
     assert set(map_in_order(lambda _: os.getpid(), range(4), 2)) == {os.getpid()}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("processes", [1, 2])
 def test_an_error_reaches_the_caller_behind_the_results_before_it(processes: int):
     results = map_in_order(lambda x: 6 // (2 - x), range(4), processes)
@@ -64,6 +68,7 @@ def test_no_more_cores_are_used_than_this_process_may(monkeypatch: pytest.Monkey
     assert set(map_in_order(lambda _: os.getpid(), range(3))) == {os.getpid()}
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("two_cores")
 def test_what_is_done_beside_is_done_in_another_process_on_threads_of_its_own():
     def work() -> tuple[int, list[int]]:
@@ -80,6 +85,7 @@ class Large:
     """What a task holds, whose memory is to be free once it is done."""
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("two_cores")
 def test_a_worker_keeps_nothing_of_what_it_has_done():
     def work(item: int) -> bool:
@@ -97,6 +103,7 @@ def test_a_worker_keeps_nothing_of_what_it_has_done():
         assert result()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("two_cores")
 def test_workers_beside_each_other_have_one_thread_each_and_one_alone_has_its_own_two():
     def work(_: int = 0) -> int:
@@ -170,6 +177,7 @@ def test_it_is_all_done_here_where_no_other_process_is_wanted(why: str, monkeypa
     assert found == [(item, os.getpid()) for item in items]
 
 
+@pytest.mark.slow
 def test_ctrl_c_reaches_the_caller_alone_and_ends_the_others_at_once(capfd: pytest.CaptureFixture[str]):
     def work(item: int) -> int:
         # As a terminal does, to all processes of a command.
@@ -194,6 +202,7 @@ def test_ctrl_c_reaches_the_caller_alone_and_ends_the_others_at_once(capfd: pyte
     assert capfd.readouterr() == ("", "")
 
 
+@pytest.mark.slow
 def test_a_process_that_dies_and_a_result_that_cannot_travel_are_said():
     with pytest.raises(ScaraIdentError, match="ended from outside"):
         list(map_in_order(lambda item: os.kill(os.getpid(), signal.SIGKILL) or item, range(4), 2))
@@ -207,6 +216,7 @@ def test_a_process_that_dies_and_a_result_that_cannot_travel_are_said():
     assert "item // 0" in "".join(caught.value.__notes__)
 
 
+@pytest.mark.slow
 def test_whose_result_nobody_waits_for_is_not_waited_for():
     start = time.monotonic()
     with beside(lambda: time.sleep(60.0)):
@@ -223,6 +233,7 @@ def a_command():
         yield
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("a_command")
 def test_each_is_done_beside_and_one_that_ends_its_process_takes_no_other_with_it(tmp_path: Path):
     def work(item: int) -> tuple[int, int]:
@@ -243,6 +254,7 @@ def test_each_is_done_beside_and_one_that_ends_its_process_takes_no_other_with_i
                 found[place]()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("a_command")
 def test_each_is_sent_as_soon_as_it_is_there_and_only_what_is_done_is_waited_for():
     # More than a pipe holds: with nobody who takes it, a process would not get to the second.

@@ -59,6 +59,7 @@ def test_the_package_itself_loads_nothing():
         _ = scara_ident.identfy
 
 
+@pytest.mark.slow
 def test_the_whole_job_is_done_with_public_names(tmp_path: Path):
     robot = load_robot()
     arm = virtual_arm(robot)
@@ -83,6 +84,7 @@ def test_the_whole_job_is_done_with_public_names(tmp_path: Path):
     assert (tmp_path / "arm.xml").read_text().startswith("<mujoco")
 
 
+@pytest.mark.slow
 def test_of_what_no_arm_can_be_the_nearest_is_exported_and_said(tmp_path: Path):
     robot = load_robot()
     recording = simulate(virtual_arm(robot), named_motion("OJD", robot), rate=250.0).recording

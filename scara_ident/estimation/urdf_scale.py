@@ -238,8 +238,8 @@ def _compared(scales: Mapping[str, float] | None, robot: Robot, slight: Sequence
         if not fits
     )
     # A URDF is often right of the large links and has the small ones roughly.
-    others = " there, or are the masses others" if np.any(usual) else ""
-    return f"{said}. Torques of the bodies are {odd}: {asked}{others}?"
+    or_masses = " there, or are the masses others" if np.any(usual) else ""
+    return f"{said}. Torques of the bodies are {odd}: {asked}{or_masses}?"
 
 
 def _turned(turned: Sequence[str], friction: FrictionSides) -> str:

@@ -12,6 +12,7 @@ from scara_ident import asking
 QUICK = ("--starts", "1", "--duration", "4", "--model", "basic")
 
 
+@pytest.mark.slow
 def test_an_empty_folder_asks_for_a_first_motion(command, steps, tmp_path: Path):
     (tmp_path / "arm").mkdir()
     (tmp_path / "arm" / "run_1.csv").write_text("time\n")

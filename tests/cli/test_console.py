@@ -18,6 +18,7 @@ from tests.made_recordings import columns, save
 from tests.shared import PATIENCE
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "file", "key"),
     [
@@ -41,6 +42,7 @@ def test_json_on_stdout_is_all_there_is_and_what_is_in_the_file(
     assert content == json.loads((out / file).read_text())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", [[], ["--json"]], ids=["tables", "json"])
 def test_results_are_written_though_nobody_reads_the_output(tmp_path: Path, form: list[str]):
     program = [sys.executable, "-c", "from scara_ident.cli import main; main()"]
@@ -55,6 +57,7 @@ def test_results_are_written_though_nobody_reads_the_output(tmp_path: Path, form
     assert json.loads((tmp_path / "base.json").read_text())["count"] == 5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "words",
     [

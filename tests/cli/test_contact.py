@@ -28,6 +28,7 @@ def pushed(folder: Path, tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_a_push_is_found_and_written(command, steps, folder: Path, result_file: Path, pushed: Path, tmp_path: Path):
     words = ["contact", pushed, result_file, "--free", folder / "OJD_1.parquet", "--free", folder / "OJD_2.parquet"]
     done = command(*words, "--output", tmp_path / "out")
@@ -49,6 +50,7 @@ def test_a_push_is_found_and_written(command, steps, folder: Path, result_file: 
     assert (tmp_path / "out" / "contact.png").stat().st_size > 10_000
 
 
+@pytest.mark.slow
 def test_json_alone_and_nothing_where_nothing_is(command, folder: Path, result_file: Path):
     done = command("contact", folder / "OJD_2.parquet", result_file, "--free", folder, "--json", "--rate", "10")
     assert (done.status, json.loads(done.out)["contacts"]) == (0, [])
@@ -59,6 +61,7 @@ def test_what_is_missing_is_one_line(command, folder: Path, result_file: Path):
     assert command("contact", folder / "OJD_2.parquet", result_file, "--free", folder / "none.csv").status == 2
 
 
+@pytest.mark.slow
 def test_where_what_is_watched_is_in_the_thresholds_that_is_said(command, folder: Path, result_file: Path):
     """Its own contacts raised them, none was found, and nothing was said."""
     said = "given as free of contact; a contact in it is in the thresholds too"

@@ -54,6 +54,7 @@ def files(folder: Path) -> set[str]:
     return {str(path.relative_to(folder)) for path in folder.rglob("*") if not path.is_dir()}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES, ids=["above", "of a page"])
 def test_a_robots_name_leads_nowhere(command, folder: Path, here: Path, name: str):
     (here / "arm.urdf").write_text(named(name))

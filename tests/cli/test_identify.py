@@ -15,6 +15,7 @@ def refuse(constant: str) -> None:
     raise AssertionError(f"{constant} is not JSON")
 
 
+@pytest.mark.slow
 def test_it_writes_what_the_contract_says(command, folder: Path, tmp_path: Path):
     out = tmp_path / "new" / "out"
     result = command(
@@ -59,6 +60,7 @@ def test_it_says_parameters_errors_and_the_result_in_words(command, folder: Path
     assert max(len(line) for line in result.out.splitlines()) <= 80
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", ["reduced", "basic"])
 @pytest.mark.parametrize("method", ["wls", "rls"])
 def test_models_and_methods_are_chosen_by_name(command, folder: Path, tmp_path: Path, model: str, method: str):
@@ -72,6 +74,7 @@ def test_models_and_methods_are_chosen_by_name(command, folder: Path, tmp_path: 
     assert content["band_hz"] == {"joint1": 15.0, "joint2": 15.0}
 
 
+@pytest.mark.slow
 def test_a_folder_and_a_glob_stand_for_their_recordings(command, folder: Path, tmp_path: Path):
     names = []
     for word in (folder, f"{folder}/*_?.*"):
@@ -80,6 +83,7 @@ def test_a_folder_and_a_glob_stand_for_their_recordings(command, folder: Path, t
     assert names == [["CI_1", "OJD_1", "OJD_2"]] * 2
 
 
+@pytest.mark.slow
 def test_names_in_brackets_are_printed_as_they_are(command, folder: Path, tmp_path: Path):
     path = tmp_path / "run[bold]x_1.parquet"
     path.write_bytes((folder / "OJD_1.parquet").read_bytes())

@@ -122,6 +122,7 @@ def test_the_ur10e_goes_from_a_file_and_a_urdf_to_an_identification(tmp_path, ca
     assert errors["shoulder_lift_joint"]["relative"] < 0.2
 
 
+@pytest.mark.slow
 def test_a_panda_with_its_gripper_goes_from_a_rosbag2_to_a_report_by_the_commands_of_the_page(
     tmp_path, capsys, monkeypatch
 ):
@@ -162,6 +163,7 @@ def test_a_panda_with_its_gripper_goes_from_a_rosbag2_to_a_report_by_the_command
     assert load_robot("out/panda_identified.urdf").joints == robot.joints
 
 
+@pytest.mark.slow
 def test_a_mapped_file_identifies_like_the_contracts(tmp_path, log, capsys):
     assert answer(capsys, log, "--urdf", embedded_urdf(), "--output", tmp_path)[0] == 0
     description = tmp_path / "robot.yaml"

@@ -112,6 +112,7 @@ def user(*words: str | Path, **options) -> subprocess.CompletedProcess[str]:
     )
 
 
+@pytest.mark.slow
 def test_a_user_gets_results_on_a_pipe_without_escape_codes(folder: Path, tmp_path: Path):
     done = user("identify", folder / "OJD_1.parquet", "--output", "out", cwd=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
@@ -121,6 +122,7 @@ def test_a_user_gets_results_on_a_pipe_without_escape_codes(folder: Path, tmp_pa
     assert (tmp_path / "out" / "identification.json").is_file()
 
 
+@pytest.mark.slow
 def test_a_user_gets_one_line_when_it_cannot_be(tmp_path: Path):
     done = user("identify", "nowhere.parquet", cwd=tmp_path)
     assert done.returncode == 2
@@ -128,6 +130,7 @@ def test_a_user_gets_one_line_when_it_cannot_be(tmp_path: Path):
     assert done.stderr == "scara-ident: nowhere.parquet: no such file or folder\n"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "offered"),
     [
@@ -143,6 +146,7 @@ def test_the_shell_is_told_how_words_go_on(words: str, offered: set[str]):
     assert set(done.stdout.split()) == offered
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
 def test_completion_is_installed_as_the_documentation_says(shell: str, tmp_path: Path):
     # Which shell runs is told by the processes above, of which there may be none, or too many.
@@ -153,12 +157,14 @@ def test_completion_is_installed_as_the_documentation_says(shell: str, tmp_path:
     assert len(written) == 1
 
 
+@pytest.mark.slow
 def test_a_terminal_that_knows_ascii_only_is_no_trouble():
     done = user("base", environment={"LC_ALL": "C", "PYTHONIOENCODING": "ascii", "PYTHONUTF8": "0"})
     assert (done.returncode, done.stderr) == (0, "")
     assert "I1zz + 0.1089 m2 + 10000 Jm1" in done.stdout
 
 
+@pytest.mark.slow
 def test_a_reader_that_goes_away_is_no_trouble():
     program = f"{sys.executable} -c 'from scara_ident.cli import main; main()' base"
     done = subprocess.run(
@@ -184,6 +190,7 @@ def test_a_full_disk_behind_the_output_is_one_line(monkeypatch, capfd: pytest.Ca
     assert told == "scara-ident: standard output or a temporary file: No space left on device; make room\n"
 
 
+@pytest.mark.slow
 def test_importing_the_package_is_quick():
     """Heavy libraries wait until they are needed."""
     heavy = ("cvxpy", "matplotlib", "polars", "pandas", "pinocchio", "numba", "yourdfpy", "rich")

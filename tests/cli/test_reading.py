@@ -6,6 +6,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from scara_ident.cli import reading
 from scara_ident.cli.reading import read_beside
 from scara_ident.robot.robot import load_robot
@@ -17,6 +19,7 @@ def test_nothing_is_read_where_nothing_is_named() -> None:
         assert wanted() == [((), []), ((), [])]
 
 
+@pytest.mark.slow
 def test_what_is_loaded_meanwhile_is_loaded_when_recordings_are_waited_for() -> None:
     program = f"""
 import sys

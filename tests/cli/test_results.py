@@ -75,6 +75,7 @@ def test_a_full_disk_is_said_before_the_work(command, disk: Path, words: list[st
 
 
 # Room for a small file, as the check before the work finds, or for the first of two, but not for the results.
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "room"),
     [
@@ -125,6 +126,7 @@ def test_a_disk_that_may_only_be_read_is_said_before_the_work(command, tmp_path:
         subprocess.run(["umount", str(tmp_path)], check=True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "words",
     [

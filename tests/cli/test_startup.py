@@ -6,6 +6,8 @@ import os
 import subprocess
 import sys
 
+import pytest
+
 from tests.shared import ROOT
 
 
@@ -16,6 +18,7 @@ def printed(program: str) -> list[str]:
     return done.stdout.split()
 
 
+@pytest.mark.slow
 def test_scipy_is_loaded_when_it_is_used_and_its_blas_has_one_thread_then() -> None:
     program = """
 import sys

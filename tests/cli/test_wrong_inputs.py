@@ -231,6 +231,7 @@ def state(folder: Path) -> dict[str, tuple[int, int, int]]:
     return {name: (of.st_size, of.st_mtime_ns, of.st_ino) for name, of in found.items()}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("words", "status", "said"), CASES, ids=[words for words, *_ in CASES])
 def test_a_wrong_input_is_one_line_and_changes_nothing(
     command, wrong: Path, results: Path, monkeypatch: pytest.MonkeyPatch, words: str, status: int, said: tuple[str, ...]

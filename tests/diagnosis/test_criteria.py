@@ -56,6 +56,7 @@ def test_what_they_stand_behind_keeps_its_order():
     assert CRITERIA.wider > 1.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "verdict", "found"),
     [
@@ -105,6 +106,7 @@ def test_what_comes_after_the_most_effects_is_named_and_nothing_is_then_called_e
     assert not any(decision.accepted for decision in result.search.decisions)
 
 
+@pytest.mark.slow
 def test_a_limit_doubled_or_halved_lets_an_effect_out_or_in():
     (spring,) = spring_diagnosed(CRITERIA).effects
     below = replace(CRITERIA, least_gain=spring.gain / 1.5)
@@ -114,6 +116,7 @@ def test_a_limit_doubled_or_halved_lets_an_effect_out_or_in():
     assert spring_diagnosed(replace(above, least_gain=0.5 * above.least_gain)).effects
 
 
+@pytest.mark.slow
 def test_what_may_be_left_over_is_obeyed():
     none = replace(CRITERIA, least_gain=1.01, least_power=2.0)
     share = spring_diagnosed(none).dependences[0].explained
@@ -132,6 +135,7 @@ def lines_of(added, criteria: SelectionCriteria) -> set[str]:
     return {item.effect.name for item in found}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("added", "name", "change"),
     [
@@ -148,6 +152,7 @@ def test_lines_are_looked_for_where_the_criteria_say(added, name: str, change: d
     assert name not in lines_of(added, replace(CRITERIA, **change))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", [0.5, 2.0])
 @pytest.mark.parametrize("name", ["single_bins", "pair_bins", "shrinkage", "parts"])
 def test_what_signals_explain_follows_bins_shrinkage_and_parts(name: str, factor: float):

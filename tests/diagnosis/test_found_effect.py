@@ -23,6 +23,7 @@ from tests.arms import noisy, recorded_torque, recording
 from tests.diagnosis.made import BANDS, NOISE, RATE, exact_runs, fitted, multisine, virtual_runs
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("late", "named"), [((0.008, 0.008, 0.008, 0.008), True), ((0.003, 0.013, 0.006, 0.011), False)]
 )
@@ -38,6 +39,7 @@ def test_a_delay_by_which_runs_differ_is_corrected_but_not_named(late: tuple[flo
     assert all("standard deviations" in note and "within its uncertainty" not in note for note in said)
 
 
+@pytest.mark.slow
 def test_errors_go_from_effect_to_effect() -> None:
     runs = virtual_runs("spring:joint1", "asymmetric_friction:joint2")
     found = diagnose(load_robot(), runs, bands=BANDS, catalogue=effects_named("spring", "asymmetric_friction")).effects
@@ -55,6 +57,7 @@ class Reciprocal(Spring):
         return {name: replace(item, told_as=-1.0) for name, item in parameters.items()}
 
 
+@pytest.mark.slow
 def test_an_effect_says_as_what_its_parameters_are_told() -> None:
     (found,) = diagnose(load_robot(), virtual_runs("spring:joint1"), bands=BANDS, catalogue=(Reciprocal(),)).effects
     assert found.parameters["stiffness"].told_as == -1.0
@@ -93,6 +96,7 @@ def _fast_runs() -> list[Recording]:
     return made
 
 
+@pytest.mark.slow
 def test_less_than_a_sample_that_removes_little_is_corrected_and_not_counted() -> None:
     """Held commands left inertias within two of their standard deviations in 54 of 100 times, of a Panda."""
     runs, samples = _fast_runs(), -0.4

@@ -37,6 +37,7 @@ def _always_off(outcome: Outcome, joint: int, size: float | None) -> JointVariat
     return JointVariation(direction, np.ones(1), size * signs[:, None], 1.0, bounds, np.zeros((len(signs), 1)))
 
 
+@pytest.mark.slow
 def test_nothing_is_demoted_where_the_rest_is_noise() -> None:
     runs = virtual_runs("asymmetric_friction:joint1:viscous_difference=0.03")
     outcome = selected(runs, AsymmetricFriction(), FrictionCoupling(), bands=(11.0, 11.0), free=False)
@@ -122,6 +123,7 @@ class Waves(Spring):
         return [np.sin(3.0 * signals.motion.q[0])]
 
 
+@pytest.mark.slow
 def test_what_a_delay_removes_is_asked_beside_what_came_in_after_it() -> None:
     """A delay of 6 ms came in before a bent torque sensor of three times its size, and was taken for a part of that (UR5)."""
     runs = with_torque(exact_runs(2, 3), 0, lambda motion: 1.5 * np.sin(3.0 * motion.q[0]))

@@ -41,6 +41,7 @@ def bent() -> Diagnosis:
     return diagnose(load_robot(), runs, validation=[held_out], bands=BANDS, catalogue=effects_named(EFFECT))
 
 
+@pytest.mark.slow
 def test_an_effect_is_told_by_one_number_and_one_standard_deviation() -> None:
     """Its coefficient among the parameters was that of another least squares, and surer than its size."""
     content = diagnosis_dict(bent())
@@ -50,6 +51,7 @@ def test_an_effect_is_told_by_one_number_and_one_standard_deviation() -> None:
     assert (own["value"], own["std"]) == (told["value"], told["std"])
 
 
+@pytest.mark.slow
 def test_what_is_predicted_follows_from_the_parameters_that_are_told() -> None:
     """The columns of its term are made anew of the estimate, on training and held out, and so are the errors."""
     found = bent()
@@ -116,6 +118,7 @@ def warming(draws: int) -> Array:
     return np.array(found)
 
 
+@pytest.mark.slow
 def test_friction_is_as_unsure_as_what_multiplies_it_leaves_it() -> None:
     """It scattered by over twice what was told of it."""
     held, told = warming(24).transpose(1, 2, 0)

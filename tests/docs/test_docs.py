@@ -177,6 +177,7 @@ def test_a_block_that_fails_or_prints_something_else_is_a_failure(tmp_path: Path
         run(page, tmp_path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
 def test_every_command_that_a_page_names_exists_and_has_its_options(page: Path) -> None:
     program = get_command(app)

@@ -163,6 +163,7 @@ def test_data_are_corrected_only_where_the_effect_says_so(effect):
             assert effect.negligible(scene, member, value) is None
 
 
+@pytest.mark.slow
 @EVERY
 def test_what_is_an_angle_on_a_turning_joint_is_a_length_on_a_sliding_one(effect, tmp_path):
     """Angles of the motor and phases stay angles: they have names of their own."""

@@ -35,6 +35,7 @@ def test_far_below_its_frequency_the_column_is_minus_inertia_times_the_loads_sec
     assert np.abs(column - expected)[:, inside].max() < 0.05 * np.abs(expected[:, inside]).max()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("joint", "stiffness"), [("joint1", 60000.0), ("joint2", 12000.0)])
 def test_the_stiffness_is_recovered(joint: str, stiffness: float):
     arm = virtual_arm()

@@ -57,6 +57,7 @@ def untied(effect: Effect, scene: Scene) -> list[Member]:
     return members[:1] + members[-1:]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["scara03", "ur5", "tree"])
 @pytest.mark.parametrize("family", FAMILIES, ids=[type(CATALOGUE[k]).__name__ for k in FAMILIES])
 def test_a_familys_derivatives_are_those_of_its_columns(family: int, name: str, tmp_path: Path) -> None:

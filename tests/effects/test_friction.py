@@ -28,6 +28,7 @@ from tests.effects.simulated import ARMS, arm_of, run, true_motion, true_scene
 from tests.simulation.made import left_over
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ARMS)
 @pytest.mark.parametrize("which", ["stribeck", "asymmetric", "coupling", "drift", "warm up", "position"])
 def test_columns_times_true_parameters_are_what_the_simulated_arm_adds(kind: str, which: str, tmp_path: Path):
@@ -128,6 +129,7 @@ def test_what_no_arm_can_have_is_refused(effect, member, possible, impossible):
         )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("switch", "effect", "member"),
     [

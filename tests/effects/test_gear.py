@@ -42,6 +42,7 @@ def test_the_column_times_the_share_is_what_the_simulated_gear_loses(kind: str, 
     assert np.abs(found[0]).max() > 1e-2 * float(arm.torque_scale[0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ARMS)
 @pytest.mark.parametrize(("mass", "stiffness"), [(1.0, 0.0), (0.0, 1.0), (2.5, 0.5)])
 def test_beside_what_acts_on_links_it_is_what_the_simulated_gear_loses_of_all_together(

@@ -20,6 +20,7 @@ def robots(tmp_path_factory: pytest.TempPathFactory) -> tuple[Robot, Robot]:
     return arms(tmp_path_factory.mktemp("arm"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["payload", "weight", "offset", "friction", "scale", "contact"])
 def test_each_change_beats_a_body_where_it_is_there(robots: tuple[Robot, Robot], kind: str):
     """What has weight and hardly any inertia is a body too, though a constant force explains it better by some 1 %."""

@@ -47,6 +47,7 @@ def test_of_one_recording_cycles_are_found(robots: tuple[Robot, Robot]):
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["offset", "friction", "scale", "contact", "nothing"])
 @pytest.mark.parametrize("spells", [CYCLES, MIDWAY, ONE, SINGLE], ids=["cycles", "midway", "one", "single"])
 def test_what_else_changes_is_no_body(robots: tuple[Robot, Robot], spells: Spells, kind: str):

@@ -133,6 +133,7 @@ def runs(arm: VirtualArm, effect: str | None, middle: float = 0.5) -> list[Recor
     return made
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("offset", [0.15, -0.6])
 def test_a_wrong_zero_is_found_and_told(offset: float):
     arm = virtual_arm(arm_of(*UPPER_ARM))
@@ -144,6 +145,7 @@ def test_a_wrong_zero_is_found_and_told(offset: float):
     assert "recording, position: offset: {shoulder_lift_joint" in found.effects[0].description
 
 
+@pytest.mark.slow
 def test_none_is_found_where_there_is_none_or_parameters_take_it_up():
     arm = virtual_arm(arm_of(*UPPER_ARM))
     assert not diagnose(arm.robot, runs(arm, None), model="basic").effects

@@ -84,6 +84,7 @@ def test_the_ratio_is_to_the_first_joint_with_what_both_scales_are_uncertain_by(
 
 
 # Up to 10 % at the largest torques.
+@pytest.mark.slow
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize(
     ("effect", "name", "size", "unit"),

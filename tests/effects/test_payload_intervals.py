@@ -61,6 +61,7 @@ def test_few_intervals_are_said_and_many_counted(robots: tuple[Robot, Robot]):
     assert family.description(scene, many) == "a payload in 4 intervals of m1_1, m0_1"
 
 
+@pytest.mark.slow
 def test_cycles_are_explained_by_one_mass(found: Diagnosis):
     """The verdict was `undecided` and no effect was found."""
     (payload,) = found.effects
@@ -100,6 +101,7 @@ def test_what_is_taken_up_in_one_run_is_found_with_its_mass_and_instant(robots: 
     assert "until" not in payload.parameters
 
 
+@pytest.mark.slow
 def test_recordings_held_out_have_intervals_of_their_own(found: Diagnosis):
     (payload,) = found.effects
     assert payload.held_out is not None

@@ -162,6 +162,7 @@ def test_a_free_phase_has_columns_for_each_recording():
     assert not np.any(columns(effect, scene, replace(item, name="new"), member))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("switch", "effect", "member"),
     [

@@ -64,6 +64,7 @@ def test_of_two_joints_that_share_parameters_the_second_is_tried(tmp_path: Path)
     assert effect.or_else(scene, Member(3), np.array([0.2])) == ""
 
 
+@pytest.mark.slow
 def test_the_joint_named_for_a_wrong_scale_depends_on_no_unit_of_length(tmp_path: Path):
     """In metres it was the column, 0.84 times the others, and in units of 20 m the ram, 1.20 times the first."""
     time, found = np.arange(3000) / 250.0, []

@@ -64,6 +64,7 @@ def recorded(velocity: float) -> list[Recording]:
     return found
 
 
+@pytest.mark.slow
 def test_a_sigmoid_is_found_with_its_size_and_speed_and_nothing_else() -> None:
     """It was `undecided` without a cause, with a negative Stribeck friction and elastic joints worth a look."""
     runs = recorded(0.05)
@@ -76,6 +77,7 @@ def test_a_sigmoid_is_found_with_its_size_and_speed_and_nothing_else() -> None:
         assert abs(told.value - true) < 3.0 * told.std < 0.2 * true, name
 
 
+@pytest.mark.slow
 def test_friction_that_jumps_is_no_sigmoid() -> None:
     runs = recorded(1e-9)
     assert not diagnose(load_robot(), runs[:4], validation=runs[4:]).effects

@@ -92,6 +92,7 @@ def test_whitening_makes_noise_white_and_leaves_phase_alone():
     assert frequency_spectrum(kept, RATE, np.array([200.0, 300.0])).max() < 1e-3 * low
 
 
+@pytest.mark.slow
 def test_noise_alone_seldom_has_a_line():
     rng = np.random.default_rng(4)
     angle = motor_angle(8.0)

@@ -32,6 +32,7 @@ def test_runs_that_do_not_differ_lie_off_by_nothing():
     assert np.array_equal(of_another_run(nothing, training, wls(training).value), np.zeros(2))
 
 
+@pytest.mark.slow
 def test_what_they_make_along_signals_is_as_large_as_what_many_make():
     after = wls(observed(runs(np.random.default_rng(3), DIFFERENT, count=12, seconds=6.0)))
     assert after.variation is not None

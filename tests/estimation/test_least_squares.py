@@ -99,6 +99,7 @@ def test_wls_refuses_noise_that_is_none(model: TorqueModel, noise: np.ndarray):
         wls(linear(model, "a_1", w, u, 100), noise)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("method", "sigma"), [(ols, (0.02, 0.008)), (wls, (0.02, 0.008)), (wls, (0.5, 0.01))])
 def test_reported_std_is_the_spread_of_estimates(model: TorqueModel, method, sigma: tuple[float, float]):
     w = rows(np.random.default_rng(1), model, 3000)

@@ -56,6 +56,7 @@ def test_offsets_of_runs_are_not_taken_for_gravity_and_nothing_else_seems_to_dif
     assert all(size < 0.01 for kinds in told.values() for kind, size in kinds.items() if kind != "offset")
 
 
+@pytest.mark.slow
 def test_standard_deviations_are_those_of_runs_without_offsets_but_for_the_offset_itself(robot: Robot):
     """Of 20 draws the errors are one standard deviation, of the masses and of the mean offset of six runs."""
     errors, ratio = [], []
@@ -81,6 +82,7 @@ def poses(robot: Robot, offset: float, seed: int, count: int) -> Observations:
     return observe(build_model(robot, "basic"), prepare(made, (8.0, 8.0)))
 
 
+@pytest.mark.slow
 def test_where_gravity_takes_up_offsets_of_runs_its_standard_deviations_know_it(robot: Robot):
     """Of 15 sets of six poses 89 % within two: by maximum likelihood 58 %, and up to 59 standard deviations in 40 sets."""
     errors = []
@@ -122,6 +124,7 @@ def test_a_fit_takes_up_of_offsets_what_least_squares_makes_of_each(robot: Robot
         assert [item.draws for item in found.variation.joints] == pytest.approx(left, rel=0.02)
 
 
+@pytest.mark.slow
 def test_the_influence_of_rows_is_what_moves_the_value(robot: Robot):
     """By generalised least squares of all rows at once, with the whole covariance."""
     observations = observed(robot, 0.5)

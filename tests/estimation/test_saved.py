@@ -26,6 +26,7 @@ def assert_same(one: Estimate, other: Estimate):
     np.testing.assert_array_equal(one.predict(*states), other.predict(*states))
 
 
+@pytest.mark.slow
 def test_parameters_covariance_and_factor_come_back(results: Results, tmp_path: Path):
     path = tmp_path / "identification.json"
     results.identification.save(path)

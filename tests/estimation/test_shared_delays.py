@@ -69,6 +69,7 @@ def test_a_constant_of_one_joint_is_no_disagreement():
     assert_allclose(np.diff(again.of_run), np.diff(found.of_run))
 
 
+@pytest.mark.slow
 def test_recordings_that_are_late_alike_differ_by_chance_alone():
     rng = np.random.default_rng(2)
     found = [pooled(*told(np.full(RUNS, 0.3), rng=rng, other=0.1)) for _ in range(300)]

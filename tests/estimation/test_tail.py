@@ -19,6 +19,7 @@ def test_a_tail_gives_back_its_rate_at_its_level():
         assert tail.rate(1.5) == pytest.approx(50.0 * (1.0 + shape) ** (-1.0 / shape))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", [-0.5, -0.2, 0.0, 0.2])
 def test_the_rate_is_right_wherever_the_tail_ends(shape: float):
     # A second apart, so that each is a cluster: what exceeds a level is known exactly. A tenth of them is fitted to.

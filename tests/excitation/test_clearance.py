@@ -129,6 +129,7 @@ def test_a_ball_beside_boxes(tmp_path):
     np.testing.assert_allclose(found[outside], expected, atol=1e-7)
 
 
+@pytest.mark.slow
 def test_a_design_keeps_its_distances_and_states_them(tmp_path):
     robot = upright(tmp_path, "", "", BALL)
     limits = limits_of(robot, share=1.0, clearance=0.1, boxes=[((0.8, 0.0, -0.55), (0.4, 0.4, 0.4))])

@@ -35,6 +35,7 @@ def made():
     )
 
 
+@pytest.mark.slow
 def test_the_csv_is_what_the_contract_says(made, tmp_path):
     path = tmp_path / "new" / "trajectory.csv"
     write_trajectory(made.trajectories[0], path)
@@ -52,6 +53,7 @@ def test_the_csv_is_what_the_contract_says(made, tmp_path):
     np.testing.assert_allclose(motion.at(between).position, made.trajectories[0].at(between)[0], atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_rate_too_low_for_the_motion_is_said(made, tmp_path):
     with pytest.raises(UsageError, match=r"rate 3 Hz: this motion reaches 1\.5 Hz and needs at least 6 Hz; use fewer"):
         write_trajectory(made.trajectories[0], tmp_path / "t.csv", rate=3.0)
@@ -65,6 +67,7 @@ def test_ros_2_gets_points_enough_for_a_fast_motion(made):
     assert len(points) == 0.25 * 240 + 1
 
 
+@pytest.mark.slow
 def test_rotors_that_nobody_stated_are_named_with_what_they_would_make_of_a_torque():
     """They are most of what a geared joint moves: limits were said to hold with a third of the torque that was then asked for."""
     model = build_model(ur5(), "basic")

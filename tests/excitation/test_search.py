@@ -45,6 +45,7 @@ def test_parameters_that_no_motion_tells_apart_are_said():
     assert "p_o3" not in build_model(robot).names
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("given", "said"),
     [
@@ -65,6 +66,7 @@ def test_a_velocity_limit_that_no_motion_comes_near_is_no_hindrance(short):
     assert design_excitation(COMPLETE, **SHORT, limits=limits, effort=QUICK).log_det > short.log_det
 
 
+@pytest.mark.slow
 def test_a_winner_far_outside_on_the_fine_grid_is_searched_again():
     problem = small_problem(COMPLETE)
     task, ones = problem.task, np.ones(len(problem.bounds))

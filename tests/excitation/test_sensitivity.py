@@ -29,6 +29,7 @@ def by_differences(smooth, at, kind, joint, step, sum_up):
     return total
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ARMS)
 @pytest.mark.parametrize("friction", [False, True])
 def test_derivatives_of_the_regressor_are_exact(name, friction):

@@ -38,6 +38,7 @@ def asked():
     return inquiry, design_excitation(model, duration=6.0, harmonics=6, tell=inquiry, limits=whole, effort=EFFORT)
 
 
+@pytest.mark.slow
 def test_the_motion_keeps_its_limits_and_is_said_to_tell(asked):
     _, design = asked
     assert all(limit.kept for limit in design.reached)
@@ -52,6 +53,7 @@ def test_the_motion_keeps_its_limits_and_is_said_to_tell(asked):
     assert not same[0].settled and same[0].instead.startswith(f"Would not tell: {PAIR}. What would: ")
 
 
+@pytest.mark.slow
 def test_what_was_promised_is_seen_and_the_effect_is_told(asked):
     inquiry, design = asked
     time = np.linspace(0.0, 6.0, 3001)
@@ -69,6 +71,7 @@ def test_what_was_promised_is_seen_and_the_effect_is_told(asked):
     assert (effect.effect, effect.joint, effect.confounded_with) == ("spring", "joint1", ())
 
 
+@pytest.mark.slow
 def test_the_motion_tells_as_much_as_that_of_the_largest_log_determinant_of_what_this_is_about():
     found = open_diagnosis()
     model = found.before.model
@@ -81,6 +84,7 @@ def test_the_motion_tells_as_much_as_that_of_the_largest_log_determinant_of_what
     assert np.mean(np.log(of[0])) > np.mean(np.log(of[1])) - 0.05
 
 
+@pytest.mark.slow
 def test_a_motion_for_what_may_be_below_the_limit_tells_of_what_nobody_thought_of_too():
     found = open_diagnosis()
     model, (spring, _) = found.before.model, questions(found)[0].suspects
@@ -93,6 +97,7 @@ def test_a_motion_for_what_may_be_below_the_limit_tells_of_what_nobody_thought_o
     assert design.log_det > plain.log_det - 0.1 * len(model.names)
 
 
+@pytest.mark.slow
 def test_the_better_half_of_the_searches_goes_on_whatever_the_number_of_processes(asked, monkeypatch):
     hurry(monkeypatch)
     inquiry, _ = asked

@@ -15,6 +15,7 @@ from tests.export.identified import model_torque, states
 COMPILERS = ((("gcc", "-std=c99"), "double"), (("g++", "-std=c++17"), "float"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("command", "real"), COMPILERS, ids=["C99, double", "C++17, float"])
 def test_it_compiles_without_a_warning_and_gives_the_model_s_torque(models, readers, tmp_path, command, real):
     if shutil.which(command[0]) is None:

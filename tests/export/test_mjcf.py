@@ -48,6 +48,7 @@ def mujoco_torque(robot: Robot, model: Any, q: Array, v: Array, a: Array) -> Arr
     return result
 
 
+@pytest.mark.slow
 @given(seed=SEEDS)
 @settings(max_examples=25)
 def test_mujoco_gets_the_identified_torque_and_damping(robot: Robot, seed: int) -> None:

@@ -31,6 +31,7 @@ def evaluated(model, values: tuple[Scalar, ...], motion) -> np.ndarray:
     return out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("effect", OF_STATE, ids=lambda effect: f"{type(effect).__name__} {getattr(effect, 'way', '')}")
 def test_every_effect_of_the_state_is_recorded_as_it_is(effect: Effect, tmp_path: Path) -> None:
     tried = 0

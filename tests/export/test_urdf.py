@@ -77,6 +77,7 @@ def stripped(text: str) -> str:
     return re.sub(r"<rotorInertia>.*?</rotorInertia>", "", text)
 
 
+@pytest.mark.slow
 @given(seed=SEEDS, like_nominal=st.booleans())
 @settings(max_examples=25)
 def test_pinocchio_gets_the_identified_torque_from_the_export(robot: Robot, seed: int, like_nominal: bool) -> None:
@@ -90,6 +91,7 @@ def test_pinocchio_gets_the_identified_torque_from_the_export(robot: Robot, seed
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-11 * np.sqrt(np.mean(expected**2)))
 
 
+@pytest.mark.slow
 @given(seed=SEEDS)
 @settings(max_examples=25)
 def test_the_bodies_read_back_are_the_identified_ones(robot: Robot, seed: int) -> None:
@@ -101,6 +103,7 @@ def test_the_bodies_read_back_are_the_identified_ones(robot: Robot, seed: int) -
         np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12 * np.max(np.abs(expected)))
 
 
+@pytest.mark.slow
 @given(seed=SEEDS, like_nominal=st.booleans())
 @settings(max_examples=25)
 def test_every_exported_link_can_exist(robot: Robot, seed: int, like_nominal: bool) -> None:

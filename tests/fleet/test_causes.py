@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from scara_ident.fleet.causes import RUN_KINDS, TOLD_RUNS, run_directions, sizes_in_words
 from tests.fleet.made import DATES, quill_fleet
 
 
+@pytest.mark.slow
 def test_the_direction_of_a_share_is_that_share_of_the_parameters(histories):
     history = histories[0]
     value, columns = history.scene.value, history.visits[0].columns
@@ -25,6 +27,7 @@ def test_the_direction_of_a_share_is_that_share_of_the_parameters(histories):
     assert not np.any(scale.weights[1])
 
 
+@pytest.mark.slow
 def test_every_cause_has_a_name_of_its_own_and_acts_somewhere(histories):
     causes = histories[0].causes
     assert len({cause.label for cause in causes}) == len(causes)
@@ -61,6 +64,7 @@ def test_sizes_are_told_as_an_effects_parameters(histories):
     assert own[""].value == 0.1 and own[""].unit == "1"
 
 
+@pytest.mark.slow
 def test_an_offset_that_weight_stands_for_is_a_cause_of_its_own_and_differs_from_run_to_run():
     history = quill_fleet(0, (0.0, 0.0, 0.0, 0.0))[0]
     joint = history.model.robot.joints[2]
@@ -72,6 +76,7 @@ def test_an_offset_that_weight_stands_for_is_a_cause_of_its_own_and_differs_from
     np.testing.assert_allclose(rows.runs[:, len(RUN_KINDS) * 2 + RUN_KINDS.index("offset")], rows.directions[k][:, 0])
 
 
+@pytest.mark.slow
 def test_a_change_of_masses_is_a_payload_where_a_body_on_the_last_link_makes_it():
     history = quill_fleet(0, (0.0, 0.0, 0.0, 0.0))[0]
     term, scene = history.model.rigid_body, history.scene

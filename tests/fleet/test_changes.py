@@ -32,6 +32,7 @@ def noise(histories):
     return fleet_scatter(histories)
 
 
+@pytest.mark.slow
 def test_the_worn_arm_is_named_with_cause_joint_size_and_date_and_no_other(histories, noise):
     found = {item.arm: find_changes(item, noise, 400.0) for item in histories}
     assert [arm for arm, changes in found.items() if changes] == [WORN]

@@ -38,6 +38,7 @@ def interrupted(x: int) -> int:
     return x
 
 
+@pytest.mark.slow
 def test_ctrl_c_is_for_who_started_the_processes_alone_and_their_environment_for_them(capfd, monkeypatch):
     monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
     before = dict(os.environ)
@@ -47,6 +48,7 @@ def test_ctrl_c_is_for_who_started_the_processes_alone_and_their_environment_for
     assert dict(os.environ) == before
 
 
+@pytest.mark.slow
 def test_what_raises_hands_on_its_exception_and_what_follows_is_done(cluster, tmp_path):
     found: list[object] = []
 
@@ -61,6 +63,7 @@ def test_what_raises_hands_on_its_exception_and_what_follows_is_done(cluster, tm
     assert sorted(str(item) for item in found) == ["12", "6", "lived", "negative"]
 
 
+@pytest.mark.slow
 def test_work_on_which_all_workers_die_says_what_to_look_at(monkeypatch):
     # Each that stands in for a dead one takes a second to begin.
     monkeypatch.setattr(module, "MOST_DEATHS", 1)
@@ -68,6 +71,7 @@ def test_work_on_which_all_workers_die_says_what_to_look_at(monkeypatch):
         run_all(die, [()], workers=1)
 
 
+@pytest.mark.slow
 def test_many_calls_give_their_results_in_order_and_raise_when_all_is_done(cluster):
     seen: dict[int, int] = {}
     address = cluster.scheduler_address
@@ -109,6 +113,7 @@ def test_without_workers_all_that_is_left_is_refused(monkeypatch):
     assert len(found) == 2 and all(isinstance(item, ScaraIdentError) for item in found)
 
 
+@pytest.mark.slow
 def test_no_scheduler_and_no_dask_are_one_line(monkeypatch):
     monkeypatch.setattr(module, "CONNECT_SECONDS", "200ms")
     with pytest.raises(UsageError, match="no scheduler answers there"), started("tcp://127.0.0.1:9"):

@@ -62,6 +62,7 @@ def test_what_does_nothing_differs_by_nothing_and_no_more_than_noise_is_none():
     assert not np.any(joint_scatter(0.01 * steps, 0.01 + np.zeros_like(noise) + np.diag(std**2)))
 
 
+@pytest.mark.slow
 def test_friction_differs_by_what_the_runs_were_made_with(histories):
     root, freedom = run_scatter(histories)
     assert freedom == freedom_of(4 * 5)
@@ -73,6 +74,7 @@ def test_friction_differs_by_what_the_runs_were_made_with(histories):
     assert offset < 0.003 and delay < 0.0005
 
 
+@pytest.mark.slow
 def test_offsets_of_an_axis_that_lifts_are_no_payload_and_what_changes_beside_them_is_found():
     """An offset of 2 % of the weight from date to date was a payload that changed."""
     assert not any(changes_of(quill_fleet(0, (0.0, 0.0, 0.0, 0.02))).values())
@@ -83,10 +85,12 @@ def test_offsets_of_an_axis_that_lifts_are_no_payload_and_what_changes_beside_th
     np.testing.assert_allclose(change.size[0], 0.05, atol=0.005)
 
 
+@pytest.mark.slow
 def test_a_slow_axis_that_lifts_has_no_payload_either():
     assert not any(changes_of(quill_fleet(118, (0.02, 0.03, 0.002, 0.02), speed=0.05)).values())
 
 
+@pytest.mark.slow
 def test_a_payload_is_told_in_kg_and_what_it_leaves_over_is_no_other_change(monkeypatch):
     scatter = (0.02, 0.03, 0.002, 0.02)
     fleet = quill_fleet(0, scatter, payload=5.0)
@@ -99,5 +103,6 @@ def test_a_payload_is_told_in_kg_and_what_it_leaves_over_is_no_other_change(monk
     assert len(changes_of(fleet)[WORN]) == 2
 
 
+@pytest.mark.slow
 def test_coulomb_and_viscous_friction_that_differ_apart_are_no_wear():
     assert not any(changes_of(quill_fleet(1, (0.03, 0.03, 0.0, 0.0))).values())

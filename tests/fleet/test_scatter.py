@@ -5,12 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from scara_ident.fleet.changes import find_changes, trials_of
 from scara_ident.fleet.scatter import fleet_scatter
 from tests.fleet.made import DATES, drawn
 
 
+@pytest.mark.slow
 def test_dates_that_differ_by_noise_alone_widen_nothing(histories):
     random, arm = np.random.default_rng(0), histories[0]
     first = arm.visits[0]
@@ -20,6 +22,7 @@ def test_dates_that_differ_by_noise_alone_widen_nothing(histories):
     assert 1.0 <= np.mean(ratios) < 1.2
 
 
+@pytest.mark.slow
 def test_one_difference_is_worth_no_more_than_what_all_causes_tell_and_names_nothing(histories):
     # Of few ratios any chance explains how they differ, and runs that differ by less than noise say nothing of them: both at
     # once made the degrees of freedom of some causes infinite.

@@ -92,6 +92,7 @@ def test_a_long_file_is_a_visit_too(folder, histories, monkeypatch):
     assert (faults, visit is not None) == ((), True)
 
 
+@pytest.mark.slow
 def test_offsets_of_runs_are_no_gravity_of_a_date(tmp_path):
     """Each date's own would be a change of the arm from one date to the next."""
     robot = load_robot(write_urdf(tmp_path / "arm.urdf", PLANAR_2R))

@@ -9,6 +9,8 @@ import sys
 from contextlib import ExitStack
 from pathlib import Path
 
+import pytest
+
 from scara_ident.fleet.folder import RecordingFile
 from scara_ident.fleet.store import Store
 from scara_ident.fleet.work import LateEngine, Settings, Work
@@ -34,6 +36,7 @@ def test_an_engine_starts_for_work_only():
         late.run([])
 
 
+@pytest.mark.slow
 def test_a_later_run_has_the_keys_of_this_one(tmp_path: Path):
     # Where a robot were a set of words, each process would have another order of them.
     description = tmp_path / "robot.yaml"

@@ -61,6 +61,7 @@ def found(recordings: list[Recording]) -> list[tuple[str, tuple[str, ...], bool]
     return [(fault.signal, fault.joints, fault.exchanged) for fault in faults_of(recordings)]
 
 
+@pytest.mark.slow
 def test_nothing_is_said_of_channels_that_are_right(recordings: tuple[Recording, ...]) -> None:
     assert found(list(recordings)) == []
 
@@ -118,6 +119,7 @@ def lightly_braked(folder: Path, gain: float, gravity: float = -9.81) -> tuple[R
     return robot, noisy(recording(robot, "run_1", time, q, effort), rng, 0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("joint", [0, 1, 2])
 def test_an_effort_of_opposite_sign_shows_where_friction_is_slight(tmp_path: Path, joint: int) -> None:
     """By what is left unexplained alone, in a band that the wrong sign has left narrow too."""
@@ -196,6 +198,7 @@ def test_diagnose_refuses_and_identify_says_it(
     assert str(result.channels[0]) in caplog.messages
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("signals", [("effort",), ("position",), ("effort", "position")])
 def test_both_refuse_exchanged_joints(recordings: tuple[Recording, ...], signals: tuple[str, ...]) -> None:
     wrong = [exchanged(item, *signals) for item in recordings]
@@ -222,6 +225,7 @@ def wandering(recording: Recording, share: float, seed: int) -> Recording:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("share", [0.3, 1.0])
 def test_fits_that_interpolate_are_not_compared(recordings: tuple[Recording, ...], share: float) -> None:
     """Ten rows a joint for nine parameters of its own: one reading or another always fits far better, by chance."""
@@ -249,6 +253,7 @@ def test_an_exchange_shows_in_a_band_that_it_left_narrow(
     assert [(fault.signal, fault.exchanged) for fault in faults] == [(" and ".join(signals), True)]
 
 
+@pytest.mark.slow
 def test_readings_that_leave_as_much_of_few_rows_are_not_observed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nothing reads a spring away; of the readings of an arm that is explained so badly nearly every one was observed."""
     robot = turned_arm.arm()

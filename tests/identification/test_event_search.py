@@ -79,6 +79,7 @@ def test_a_push_of_three_times_what_a_ripple_leaves_is_found():
     assert found.stop * found.binned.width == pytest.approx(8.5, abs=0.1)
 
 
+@pytest.mark.slow
 def test_pushes_do_not_hide_one_another():
     for begins in ((3.0,), (3.0, 8.0)):
         left = white(6)
@@ -160,6 +161,7 @@ def test_what_only_a_trend_has_made_is_no_event():
     assert standing_out(after, lambda: [after, plain]) == []
 
 
+@pytest.mark.slow
 def test_beside_a_state_that_the_arm_is_in_once_nothing_is_an_event_unless_it_is_large():
     for size, found in ((1.5, []), (6.0, [7.72])):
         left = white(8)

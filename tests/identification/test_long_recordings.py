@@ -61,6 +61,7 @@ def assert_same(one: Identification, other: Identification) -> None:
             assert (mine.rms, mine.rms_unfiltered) == pytest.approx((its.rms, its.rms_unfiltered), rel=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["wls", "ols", "rls"])
 def test_parts_say_what_the_whole_says(run, tmp_path, monkeypatch, method):
     path = written(tmp_path, run)
@@ -69,6 +70,7 @@ def test_parts_say_what_the_whole_says(run, tmp_path, monkeypatch, method):
     assert "of all 15000 samples, read in 4 parts" in " ".join(parts.notes)
 
 
+@pytest.mark.slow
 def test_bands_chosen_and_events_found_are_those_of_the_whole_beside_another_recording(run, tmp_path, monkeypatch):
     path = written(tmp_path, pushed(ROBOT, run, np.array([12.0, -9.0, 0.0]), 43.0, 44.2))
     other = noisy(swing(ROBOT, "other", seed=3, rate=250.0), np.random.default_rng(1), 0.01)
@@ -120,6 +122,7 @@ def test_a_part_that_cannot_be_used_is_left_out_and_named(run, tmp_path, monkeyp
         in_parts(monkeypatch, useless)
 
 
+@pytest.mark.slow
 def test_offsets_of_long_files_are_noise_too(tmp_path, monkeypatch):
     """Of three files, each with an offset of its own, a first moment was 6.5 standard deviations off, and a note ended in an error."""
     robot = load_robot(write_urdf(tmp_path / "arm.urdf", PLANAR_2R))

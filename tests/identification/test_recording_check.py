@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from scara_ident.identification.events import Event
 from scara_ident.identification.identify import identify
@@ -31,6 +32,7 @@ def run(name: str, seed: int, payload: float = 0.0):
     return formula_run(loaded, name, [31, seed], seconds=15.0, rate=125.0, bits=18)
 
 
+@pytest.mark.slow
 def test_a_loaded_held_out_recording_is_named():
     training = [run(f"run{k}", k) for k in range(4)]
     found = identify(ROBOT, training, validation=[run("plain", 8), run("loaded", 9, 3.0)])
@@ -39,6 +41,7 @@ def test_a_loaded_held_out_recording_is_named():
     assert any("loaded is explained much worse" in note for note in found.notes)
 
 
+@pytest.mark.slow
 def test_a_sensor_that_was_zeroed_in_a_held_out_recording_is_no_other_payload(tmp_path):
     """Of a small motion its weight is all but constant, and so is an offset."""
     robot = load_robot(write_urdf(tmp_path / "arm.urdf", PLANAR_2R))
@@ -52,6 +55,7 @@ def test_a_sensor_that_was_zeroed_in_a_held_out_recording_is_no_other_payload(tm
         assert [event.kind for event in found.events] == kinds
 
 
+@pytest.mark.slow
 def test_a_push_in_a_held_out_recording_is_no_other_payload():
     training = [run(f"run{k}", k) for k in range(4)]
     held_out = pushed(ROBOT, run("pushed", 8), np.array([20.0, 0.0, -15.0]), 6.0, 7.5)

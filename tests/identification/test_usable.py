@@ -63,6 +63,7 @@ KINDS = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_useless_recording_is_left_out_with_a_note(robot: Robot, kind: str):
     good, bad = [moving(robot, "a_1", 1), moving(robot, "b_1", 2)], useless(robot)[kind]
@@ -109,6 +110,7 @@ def test_fewer_rows_than_parameters_are_refused(robot: Robot):
         identify(robot, [moving(robot, "a_1", 1)], model="basic", bands=(0.3, 0.3))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_command_leaves_it_out(robot: Robot, kind: str):
     good, bad = [moving(robot, "a_1", 1), moving(robot, "b_1", 2)], useless(robot)[kind]

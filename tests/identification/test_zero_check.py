@@ -24,6 +24,7 @@ def told(faults: tuple[ChannelFault, ...]) -> list[dict[str, int]]:
     return [{joint[-1]: own.quarters for joint, own in fault.readings.items()} for fault in faults]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("quarters", [(0, 2, 0, 0), (0, -1, 1, 0)])
 def test_zeros_by_quarter_turns_are_told(quarters: tuple[int, ...]) -> None:
     robot = arm()
@@ -66,6 +67,7 @@ def test_no_zero_is_told_of_other_faults() -> None:
     assert (fault.signal, fault.joints, fault.zeros) == ("effort", ("j2s6s200_joint_3",), ())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gravity", [(0.0, 0.0, 9.81), (9.81, 0.0, 0.0)])
 def test_an_arm_that_is_mounted_otherwise_has_no_zero_of_its_own(gravity: tuple[float, ...]) -> None:
     """Half a turn of the shoulder leaves as much as gravity the other way round."""
@@ -73,6 +75,7 @@ def test_an_arm_that_is_mounted_otherwise_has_no_zero_of_its_own(gravity: tuple[
     assert channel_faults(seen(robot, runs(standing(robot, gravity), (0,) * 4))) == ()
 
 
+@pytest.mark.slow
 def test_the_line_that_is_told_mends_it(tmp_path: Path) -> None:
     """In degrees, beside an offset that is there already."""
     robot = arm()

@@ -65,6 +65,7 @@ def let_in(model: FittedModel, own: np.ndarray, size: float, draws: int = 100) -
 SPREAD, SHORT = list(range(BLOCKS)), [2, 7, 15, 22, 30]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("own", [column(SPREAD), column(SHORT), mostly_one()])
 def test_much_less_than_is_needed_is_seldom_let_in_and_much_more_nearly_always(own):
     model = blocks_of(own).fitted(range(PARAMETERS), CRITERIA.parts)

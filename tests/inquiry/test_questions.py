@@ -63,6 +63,7 @@ def test_a_p_value_speaks_for_an_effect_as_much_as_it_can():
     assert spring.value[0] > 0.0 and spring.odds == pytest.approx(1.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_what_the_noise_of_positions_makes_does_not_rank_first(seed: int):
     found = coarse_diagnosis(seed)

@@ -44,6 +44,7 @@ def test_slow_noise_counts_as_blocks_of_time_show_it():
     assert np.all(found > 0.4 * slow) and np.all(found < slow)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_what_the_noise_of_positions_leaves_is_none(seed: int):
     # The difference of two variances that are known to a tenth each, the larger of them twice as large.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 import yaml
 
 from tests.arms import Link, write_urdf
@@ -67,6 +68,7 @@ def test_short_names_of_controllers_are_positions_and_currents(tmp_path):
     assert found.mapping["effort"] == {"column": "ActCur[{index}]", "unit": "A"}
 
 
+@pytest.mark.slow
 def test_the_topic_with_the_arms_joints_is_chosen(tmp_path):
     other = {name.replace("joint", "finger"): values for name, values in MADE.items()}
     bag = write_bag(tmp_path / "run", MADE | other, topics=("/b/joint_states",))

@@ -20,6 +20,7 @@ def test_there_are_many():
     assert len({log.name for log in LOGS}) == len(LOGS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("log", LOGS, ids=lambda log: log.name)
 def test_a_log_is_read_right_or_refused_with_the_remedy(log: Log, tmp_path: Path):
     urdf, path = log.urdf(tmp_path), log.write(tmp_path)

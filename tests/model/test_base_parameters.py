@@ -108,6 +108,7 @@ def test_the_check_passes(tmp_path: Path, name: str):
     assert check.rank == check.count
 
 
+@pytest.mark.slow
 def test_a_humanoid_has_as_many_base_parameters_as_its_regressor_has_rank():
     robot = load_robot(example_urdf("talos_reduced.urdf"))
     base = find_base_parameters(robot)

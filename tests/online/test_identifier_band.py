@@ -54,6 +54,7 @@ def made(seconds: float, lost=()) -> tuple[np.ndarray, np.ndarray]:
 PLACES = st.lists(st.integers(0, 699), max_size=12)
 
 
+@pytest.mark.slow
 @given(PLACES, st.integers(0, 699), st.integers(1, 80), PLACES)
 @settings(max_examples=25, deadline=None)
 def test_pieces_of_any_size_and_lost_samples_make_no_difference(tmp_path_factory, lost, burst, length, ends):
@@ -73,6 +74,7 @@ def test_pieces_of_any_size_and_lost_samples_make_no_difference(tmp_path_factory
             np.testing.assert_array_equal(value, expected[name])
 
 
+@pytest.mark.slow
 @given(st.integers(0, 700), PLACES)
 @settings(max_examples=25, deadline=None)
 def test_a_crash_changes_nothing(tmp_path_factory, half, lost):
@@ -87,6 +89,7 @@ def test_a_crash_changes_nothing(tmp_path_factory, half, lost):
         np.testing.assert_array_equal(value, expected[name])
 
 
+@pytest.mark.slow
 def test_parameters_lie_within_their_standard_deviations():
     scores = []
     for seed in range(8):
@@ -110,6 +113,7 @@ def test_it_is_the_estimate_of_the_whole_recording():
     np.testing.assert_allclose(online.std, offline.std, rtol=0.35)
 
 
+@pytest.mark.slow
 def test_the_size_of_each_joints_noise_is_found():
     states = signals(120.0)
     clean = torque(states, truth()) - torque(states, 0.0 * truth())
@@ -122,6 +126,7 @@ def test_the_size_of_each_joints_noise_is_found():
     assert np.max(np.abs(wrong.value - right.value) / right.std) < 0.5
 
 
+@pytest.mark.slow
 def test_few_lost_samples_are_bridged_and_after_many_the_filter_begins_anew():
     states = signals(60.0)
     q, effort = rounded(states[0]), torque(states, truth())
@@ -199,6 +204,7 @@ def test_a_block_that_cannot_be_absorbed_does_not_end_it(monkeypatch: pytest.Mon
     assert np.max(np.abs(online.value - truth()) / online.std) < 4.0
 
 
+@pytest.mark.slow
 @CHANGES
 def test_a_change_is_seen_within_a_second_and_a_half_and_named(kind, joint):
     states = signals(62.0)
@@ -218,6 +224,7 @@ def coarse(bits: int, band: float, seconds: float = 60.0, seed: int = 0) -> Onli
     return fed(np.round(states[0] / step) * step, torque(states, truth(), seed=seed), replace(SETTINGS, band=band))
 
 
+@pytest.mark.slow
 def test_a_band_too_wide_for_the_encoder_is_said_once_and_a_narrower_that_does(
     caplog: pytest.LogCaptureFixture, tmp_path: Path
 ):
@@ -238,6 +245,7 @@ def test_a_band_too_wide_for_the_encoder_is_said_once_and_a_narrower_that_does(
     assert caplog.messages == [note]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("bits", "band"), [(17, 10.0), (17, 20.0), (13, 5.0)])
 def test_of_a_band_that_goes_with_the_encoder_nothing_is_said(bits: int, band: float, caplog: pytest.LogCaptureFixture):
     for seed in (1, 2, 3):

@@ -62,6 +62,7 @@ def test_nothing_missing_leaves_the_noise():
         assert errors[1].rms <= 1.5 * 0.008
 
 
+@pytest.mark.slow
 def test_nothing_missing_gives_the_same_parameters_from_different_trajectories():
     robot = load_robot()
     recordings = read_recordings([shared_path("cases", "nothing_missing", "train")], robot)
@@ -70,6 +71,7 @@ def test_nothing_missing_gives_the_same_parameters_from_different_trajectories()
     assert np.all(np.abs(one.value - other.value) <= 3.0 * np.hypot(one.std, other.std))
 
 
+@pytest.mark.slow
 def test_repeatability_is_the_torque_noise_of_the_cases():
     robot = load_robot()
     recordings = read_recordings([shared_path("cases", "nothing_missing", "train")], robot)

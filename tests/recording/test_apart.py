@@ -84,6 +84,7 @@ def test_where_nothing_may_be_forked_they_are_read_here_and_once(
     assert first is second
 
 
+@pytest.mark.slow
 def test_one_that_crashes_its_reader_is_left_out_and_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     stand_in(monkeypatch, crash="OJD_2", refuse="OJD_4")
     paths = files(tmp_path, "OJD_1", "OJD_2", "OJD_3", "OJD_4", "OJD_5")
@@ -99,6 +100,7 @@ def test_one_that_crashes_its_reader_is_left_out_and_named(tmp_path: Path, monke
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", ["crash", "refuse"])
 def test_where_no_other_is_left_it_is_an_error(how: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     stand_in(monkeypatch, **{how: "OJD_2"})
@@ -120,6 +122,7 @@ def test_what_is_no_recording_is_said_before_anything_is_read(tmp_path: Path) ->
         pass
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["inspect", "identify", "compare", "diagnose", "excite --known", "ask"])
 def test_a_command_says_it_in_one_line(tmp_path: Path, command: str) -> None:
     (tmp_path / "recordings").mkdir()

@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from scara_ident.recording.columns import recording_columns
 from tests.results import Results
 
 
+@pytest.mark.slow
 def test_signals_that_are_there_are_columns(results: Results):
     run = results.runs[0].recording
     columns = recording_columns(run)

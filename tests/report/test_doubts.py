@@ -40,6 +40,7 @@ def in_order(text: str, *parts: str) -> bool:
     return -1 not in places and places == sorted(places)
 
 
+@pytest.mark.slow
 def test_gravity_that_points_elsewhere_stands_before_the_parameters(hanging: Identification, tmp_path: Path):
     content = identification_dict(hanging)
     (doubt,) = content["doubts"]

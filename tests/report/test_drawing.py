@@ -17,6 +17,7 @@ def line(*layers, **options) -> Figure:
     return single("name", "title", "", Plot("time [s]", (Panel("torque [N m]", layers, **options),)))
 
 
+@pytest.mark.slow
 def test_a_peak_of_one_sample_in_a_hundred_thousand_is_drawn(tmp_path: Path):
     signal = np.zeros(100_000)
     flat = line(Line(Grid(0.0, 1.0, len(signal)), signal.copy(), "blue"), limits=(-1.0, 1.0))

@@ -42,6 +42,7 @@ def with_remainder():
     return runs, diagnose(load_robot(), runs, bands=BANDS, catalogue=())
 
 
+@pytest.mark.slow
 def test_an_effect_is_drawn_before_and_after_and_stands_in_the_story(with_spring, tmp_path):
     _, found = with_spring
     (picture,) = diagnosis_pictures(DiagnosisContext(found))
@@ -79,6 +80,7 @@ def test_pictures_of_an_earlier_diagnosis_do_not_stay(tmp_path: Path) -> None:
     assert sorted(path.name for path in tmp_path.iterdir()) == ["effect_1.png", "mine.png"]
 
 
+@pytest.mark.slow
 def test_held_out_runs_are_drawn_first_and_not_too_many(tmp_path: Path, monkeypatch):
     from matplotlib.figure import Figure
 

@@ -10,6 +10,7 @@ from scara_ident.report.traces import kept, traces
 from tests.report.simulated import made, resting, run
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bands", [(15.0, 15.0), (8.0, 20.0), (6.0, None), (None, None)])
 @pytest.mark.parametrize("still", [False, True])
 def test_the_residual_that_is_drawn_has_the_rms_that_is_printed(bands, still):

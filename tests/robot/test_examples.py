@@ -32,6 +32,7 @@ def test_a_robot_is_loaded_by_its_name(name: str, file: str, joints: int):
     assert np.all(robot.standard_parameters()[: 10 * joints : 10] > 0.0)
 
 
+@pytest.mark.slow
 def test_every_name_can_be_given_on_a_command_line():
     robots = example_robots()
     assert len(robots) > 50

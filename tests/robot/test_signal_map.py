@@ -143,6 +143,7 @@ def test_a_current_without_its_gain_is_refused(tmp_path):
         described(tmp_path, "{effort: {unit: A}}", "{j1: {effort_gain: 14.87}, j2: {}}")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("unit", "gain", "whole"), [("%", 0.01, "1"), ("permille", 0.002, "2")])
 def test_a_gain_for_one_per_cent_is_refused_with_that_for_a_hundred(tmp_path, unit, gain, whole):
     # The URDF's limit is 50 N m at the joint, and 1 N m at the motor of the first.

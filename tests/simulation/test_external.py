@@ -37,6 +37,7 @@ def bias_of(plant: Plant, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.nd
     return before, bias
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("joint", range(4))
 def test_a_push_is_the_transposed_jacobian_of_its_point_times_the_force(tmp_path: Path, joint: int) -> None:
     robot = tree(tmp_path)
@@ -56,6 +57,7 @@ def test_a_push_is_the_transposed_jacobian_of_its_point_times_the_force(tmp_path
         np.testing.assert_allclose(before - after, jacobian[:3].T @ FORCE, atol=1e-12 * np.abs(before).max())
 
 
+@pytest.mark.slow
 def test_it_comes_and_goes_by_half_a_cosine(tmp_path: Path) -> None:
     draft = ideal(virtual_arm(tree(tmp_path))).draft()
     draft.append("push", 0, POINT, FORCE, np.array([1.0, 2.0, 0.1]))

@@ -29,6 +29,7 @@ def energy(arm: VirtualArm, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     return rotors + np.array(links)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["scara", "vertical", "tree"])
 def test_without_losses_and_control_energy_is_conserved(kind: str, tmp_path: Path) -> None:
     links = {"vertical": lambda: load_robot(write_urdf(tmp_path / "v.urdf", PLANAR_2R)), "tree": lambda: tree(tmp_path)}

@@ -47,6 +47,7 @@ def test_a_circle_of_the_scara_has_its_radius() -> None:
     assert angle[-1] - angle[0] == pytest.approx(-4.0 * np.pi)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["ur5_robot.urdf", "panda.urdf"])
 def test_a_six_axis_arm_holds_its_orientation_along_a_line(name: str) -> None:
     robot = load_robot(example_urdf(name))
@@ -86,6 +87,7 @@ def test_a_sliding_axis_takes_part(tmp_path: Path) -> None:
     np.testing.assert_allclose(motion.position[0, -1], np.arctan2(0.4, 0.3), atol=1e-8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("start", "end", "said"),
     [

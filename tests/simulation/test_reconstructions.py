@@ -84,6 +84,7 @@ def test_indexes_come_out_close_and_in_the_papers_order() -> None:
         assert abs(np.log10(1.0 + MATCH[name, "J_k"].relative)) < 0.2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", RECONSTRUCTIONS)
 def test_a_reconstruction_is_smooth_and_within_the_arms_limits(name: str) -> None:
     robot = load_robot()

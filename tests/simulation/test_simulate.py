@@ -49,6 +49,7 @@ def assert_own_parameters(arm: VirtualArm, duration: float) -> None:
     assert small.max() < 1e-6 * np.abs(true.effort).max()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("side", ["motor", "joint"])
 def test_least_squares_on_exact_signals_give_the_arm_its_own_parameters(side: str) -> None:
     arm = on_side(replace(scara(), torque_offset=np.array([0.03, -0.02])), side)

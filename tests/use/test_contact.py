@@ -20,6 +20,7 @@ def observer() -> ContactObserver:
     return contact_observer(known_ur5(), [quiet(seed) for seed in range(3)], rate=1.0)
 
 
+@pytest.mark.slow
 def test_a_push_on_the_tool_is_found_with_its_force(observer: ContactObserver):
     found = look_for_contact(observer, [pushed(quiet(7), FORCE, 8.0, 9.0), quiet(8)])
     (contact,) = found.contacts
@@ -42,12 +43,14 @@ def test_a_push_on_the_tool_is_found_with_its_force(observer: ContactObserver):
     assert json_text(content)
 
 
+@pytest.mark.slow
 def test_what_loads_inner_joints_only_is_on_their_link(observer: ContactObserver):
     found = look_for_contact(observer, [pushed(quiet(7), 2.0 * FORCE, 8.0, 9.0, joints=2)])
     assert {each.place for each in found.contacts} == {"upper_arm_link"}
     assert found.contacts[0].force is None
 
 
+@pytest.mark.slow
 def test_stated_forces_are_as_sure_as_they_say(observer: ContactObserver):
     rng = np.random.default_rng(3)
     off, stds = [], []

@@ -37,6 +37,7 @@ def test_a_force_on_the_tool_is_placed_there(observer: ContactObserver):
     assert off(found, FORCE) < 2.0
 
 
+@pytest.mark.slow
 def test_a_force_beside_the_tool_is_told_with_its_point(observer: ContactObserver):
     # As if on the tool it would be too small, or turned.
     rng, placed = np.random.default_rng(1), 0

@@ -43,6 +43,7 @@ def off(found: Contact, force: np.ndarray) -> float:
     return float(np.linalg.norm(found.force - force) / np.linalg.norm(force))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("made", [quiet, turning])
 @pytest.mark.parametrize("lasting", [0.3, 1.0])
 def test_a_strong_force_is_told_as_well_as_the_torque_without_it(observers, made, lasting: float):
@@ -58,6 +59,7 @@ def test_a_strong_force_is_told_as_well_as_the_torque_without_it(observers, made
     assert np.max(np.abs(z)) < 2.0
 
 
+@pytest.mark.slow
 def test_a_force_that_rises_and_falls_is_told_where_it_is_whole(observers):
     # In steps of 20 ms to all of it and back, which is a push that nobody taps: 60 ms each.
     run = quiet(21)

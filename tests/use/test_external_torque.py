@@ -27,6 +27,7 @@ def _exact(known: IdentifiedModel, rate: float, outside: np.ndarray):
     return time, q, v, known.torque(motion(q, v, a)) - outside * (time > 2.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("velocity", [True, False])
 def test_a_step_from_outside_comes_through_the_low_pass(known: IdentifiedModel, velocity: bool):
     outside = np.array([[0.3], [-0.1]])

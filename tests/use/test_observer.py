@@ -20,6 +20,7 @@ def observer() -> ContactObserver:
     return contact_observer(known_ur5(), [quiet(seed) for seed in range(3)], rate=1.0)
 
 
+@pytest.mark.slow
 def test_sample_by_sample_is_the_same(observer: ContactObserver):
     run = pushed(quiet(7), FORCE, 8.0, 9.0)
     observer.reset()
@@ -34,6 +35,7 @@ def test_sample_by_sample_is_the_same(observer: ContactObserver):
     assert (touched[0], touched[-1]) == (pytest.approx(contact.start), pytest.approx(contact.stop))
 
 
+@pytest.mark.slow
 def test_lost_samples_and_gaps_are_no_contact(observer: ContactObserver):
     run = quiet(7, seconds=6.0)
     lost = run.effort.copy()

@@ -30,6 +30,7 @@ def test_it_keeps_the_limits_and_is_its_own_derivative(name: str | None) -> None
     np.testing.assert_allclose(slope[:, 5:-5], motion.velocity[:, 5:-5], atol=2e-2 * np.abs(motion.velocity).max())
 
 
+@pytest.mark.slow
 def test_an_arm_that_cannot_hold_itself_is_refused() -> None:
     arm = virtual_arm(ur5())
     weak = replace(arm, robot=replace(arm.robot, effort_limit=np.full(6, 0.5)))

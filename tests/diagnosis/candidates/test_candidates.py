@@ -226,6 +226,7 @@ def test_without_candidates_the_rows_are_those_of_the_model():
     assert CandidateColumns(seen).rows(scene_on(seen.model, wls(seen).value, seen), []) == []
 
 
+@pytest.mark.slow
 def test_columns_made_in_two_processes_are_the_same_to_the_last_bit(
     gapped: Observations, monkeypatch: pytest.MonkeyPatch
 ):

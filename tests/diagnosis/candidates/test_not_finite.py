@@ -57,6 +57,7 @@ def tried(runs, *catalogue: Effect, asked_for: bool = False):
     return search(SearchTask(complete(), catalogue, asked_for=asked_for), CandidateColumns(observed(runs)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("by", [np.nan, np.inf, 1e200])
 def test_an_effect_that_nobody_asked_for_is_left_out_with_a_line(by: float):
     found = tried(waving(6.0), Broken(by=by), Broken("A_2", by), Cogging())
@@ -83,6 +84,7 @@ def test_one_that_was_asked_for_is_an_error_of_a_line():
     assert (str(raised.value), raised.value.exit_status) == (said, 1)
 
 
+@pytest.mark.slow
 def test_beside_all_that_is_built_in_it_is_a_note_of_the_result():
     found = diagnose(load_robot(), exact_runs(), bands=BANDS, catalogue=(*CATALOGUE, Broken("B")))
     assert [note.partition(":")[0] for note in found.notes] == ["broken of joint1, joint2 cannot be tried"]
@@ -95,6 +97,7 @@ def test_of_an_effect_with_some_values_the_others_are_tried():
     assert found.notes[0].startswith("ended of joint1, joint2 cannot be tried with some values of its parameters: ")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("end", "best"), [(6.2001, 6.2), (6.05, 6.05)])
 def test_a_fit_goes_back_from_values_without_columns(end: float, best: float):
     """It goes past the best on its way there, and stays at the edge where the best is beyond it; both ended in numpy's error."""

@@ -259,6 +259,7 @@ def soft(step, frequency: float) -> Decision:
     return decision
 
 
+@pytest.mark.slow
 def test_what_noise_in_positions_and_torque_could_make_has_to_be_there_further_down(monkeypatch: pytest.MonkeyPatch):
     """A servo on 16 bits per turn made of a rigid shoulder a gear of 1557 +- 276 N m/rad, of which 58 % was left without the noise."""
     # What of the noise is in the torque decides how much of it the check beside this one sees.
@@ -275,6 +276,7 @@ def test_what_noise_in_positions_and_torque_could_make_has_to_be_there_further_d
     assert noise_objection(step, replace(decision, gain=1.01 * share)) is None
 
 
+@pytest.mark.slow
 def test_a_soft_gear_is_there_further_down_on_coarse_encoders_too():
     step = step_beside(on_coarse_encoders("joint_elasticity:joint1:stiffness=20000"), bands=(25.0, 25.0))
     decision = soft(step, 14.0)

@@ -58,6 +58,7 @@ def soft() -> Diagnosis:
     return diagnosed([SOFT], 10)
 
 
+@pytest.mark.slow
 def test_a_mean_of_the_positions_is_a_delay_and_no_elastic_gear(rigid: Diagnosis):
     """Stiffness of joint1 21500 ± 1600 N m/rad, of a rigid arm whose positions are means over 80 ms."""
     (delay,) = rigid.effects
@@ -67,11 +68,13 @@ def test_a_mean_of_the_positions_is_a_delay_and_no_elastic_gear(rigid: Diagnosis
     assert {item.joint for item in rigid.tentative} == {"joint1", "joint2"}
 
 
+@pytest.mark.slow
 def test_no_band_is_asked_for_that_the_filter_has_emptied(rigid: Diagnosis):
     # A mean over 80 ms keeps nothing at 12.5 Hz, and 86 % at 0.15 over its delay.
     assert max(band or np.inf for band in rigid.search.bands) <= 0.16 / (19 / 2 / RATE)
 
 
+@pytest.mark.slow
 def test_an_elastic_gear_beside_a_filter_of_the_positions_is_found(soft: Diagnosis):
     delay, gear = sorted(soft.effects, key=lambda item: item.effect, reverse=True)
     assert delay.effect == "time_delay"
@@ -80,6 +83,7 @@ def test_an_elastic_gear_beside_a_filter_of_the_positions_is_found(soft: Diagnos
     assert gear.parameters["stiffness"].value == pytest.approx(2000.0, rel=0.12)
 
 
+@pytest.mark.slow
 def test_beside_a_filter_short_recordings_hold_no_second_gear_and_the_first_is_as_unsure_as_the_filter_makes_it():
     """Of 7 s: 2286 +- 39 N m/rad beside a gear of the first joint of 147,800 +- 12,100, which was fitted with it and stood for the filter."""
     found = diagnosed([SOFT], 10, 7.0)
@@ -110,6 +114,7 @@ class SameTorque(Effect):
         return JointElasticity().signal_columns(alone, member)
 
 
+@pytest.mark.slow
 def test_only_what_leaves_a_rest_objects(soft: Diagnosis):
     step = soft.search.step
     (gear,) = (place for place, item in enumerate(step.chosen) if item.effect.name == "joint_elasticity")
@@ -124,6 +129,7 @@ def test_only_what_leaves_a_rest_objects(soft: Diagnosis):
     assert why.startswith("a torque of the same kind does as well in its place, and beside it")
 
 
+@pytest.mark.slow
 def test_a_gear_beside_a_mean_over_60_ms_is_not_told_wrong():
     """The first joint's gear seemed to have twice its stiffness, 24300 +- 1500 N m/rad; up to a fifth over the delay, 56,400, and the second one."""
     found = diagnosed(["joint_elasticity:joint1:stiffness=12000"], 15)

@@ -78,12 +78,14 @@ def nothing_missing():
     return diagnose(load_robot(), virtual_runs(), bands=BANDS)
 
 
+@pytest.mark.slow
 def test_complete_is_earned_by_repetition(nothing_missing):
     assert nothing_missing.verdict == "complete"
     assert [item.by for item in nothing_missing.evidence] == ["repetition"] * 2
     assert all(item.limit < CRITERIA.least_power for item in nothing_missing.evidence)
 
 
+@pytest.mark.slow
 def test_an_effect_comes_in_from_its_detection_limit_on(nothing_missing):
     search = nothing_missing.search
     decision = best_of_each(search.decisions)["spring of joint2"]

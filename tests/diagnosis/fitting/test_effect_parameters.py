@@ -73,6 +73,7 @@ def test_what_changes_with_a_coefficient_that_is_left_open_is_not_told():
     assert (told["stiffness"].std, told["rest_position"].std) == (pytest.approx(5e-4), np.inf)
 
 
+@pytest.mark.slow
 def test_the_deviation_of_a_nonlinear_parameter_is_its_scatter_over_noise():
     """Every repetition finds the parameter by search over a grid and a parabola, not by the derivative."""
     runs = stribeck_runs()
@@ -174,6 +175,7 @@ def test_the_deviation_of_a_coefficient_holds_what_the_noise_of_positions_does()
     assert whole["share"].std == pytest.approx(np.hypot(scatter["share"].std, bias), rel=1e-3)
 
 
+@pytest.mark.slow
 def test_what_lags_has_noise_where_accelerations_have_next_to_none() -> None:
     """Steps of 20 bits bias no inertia, and a fit of an elastic gear was told as if there were none."""
     step = 2.0 * np.pi / 2**20
@@ -215,6 +217,7 @@ def fits(robot: Robot, runs: Sequence[Recording], chosen: Candidate, noise: Arra
     return {name: np.array(each) for name, each in found.items()}
 
 
+@pytest.mark.slow
 def test_a_tilt_is_as_unsure_as_the_masses_that_it_pulls_at(tmp_path: Path):
     """Of a slide that turns, gravity from the side tells mass times tilt: the tilt seemed known however little the mass was."""
     links = (
@@ -235,6 +238,7 @@ def test_a_tilt_is_as_unsure_as_the_masses_that_it_pulls_at(tmp_path: Path):
         assert np.mean(np.abs(value - tilt) < 2.0 * std) > 0.8
 
 
+@pytest.mark.slow
 def test_what_a_gear_loses_is_told_where_one_parameter_is_its_load(tmp_path: Path):
     """Of a lift the gain that goes with the loss is one with its mass: free, it left open how large the loss is."""
     robot = load_robot(write_urdf(tmp_path / "lift.urdf", (Link("prismatic", mass=20.0),)))
@@ -266,6 +270,7 @@ def test_what_rows_leave_open_is_no_less_known_beside_what_was_taken_out_of_the_
     assert std[told] == pytest.approx(start.std[told], rel=0.2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("effect", CATALOGUE, ids=lambda effect: type(effect).__name__)
 def test_a_coefficient_is_as_unsure_among_all_parameters_as_among_those_of_its_effect(effect: Effect):
     """The width of a clearance was known to 7e-06 rad in the list, and to 7e-05 as the effect's parameter."""

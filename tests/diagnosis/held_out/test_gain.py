@@ -63,6 +63,7 @@ def errors(observations: Observations, value: np.ndarray) -> np.ndarray:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("effect", [UNEVEN, DELAY])
 def test_an_effect_that_is_there_in_both_removes_most_of_what_is_held_out(effect: str):
     result = found(effect, effect)
@@ -95,6 +96,7 @@ def without_offsets(held: Observations, after: Estimate, joint: int, signal: Arr
     return np.asarray((vectors / np.sqrt(values)) @ vectors.T @ signal)
 
 
+@pytest.mark.slow
 def test_the_error_without_it_is_that_of_a_fit_of_all_else_to_what_was_fitted():
     result = found(UNEVEN, UNEVEN)
     (effect,) = result.effects
@@ -154,6 +156,7 @@ def test_the_error_without_it_is_that_of_a_fit_of_all_else_to_what_was_fitted():
     assert gain.std == pytest.approx(std, rel=2e-3)
 
 
+@pytest.mark.slow
 def test_a_long_delay_shows_as_long_as_it_is():
     """Of 18 ms found right 12 % showed: a delay's slope was taken for it, at frequencies where it is half a period."""
     effect = "time_delay:delay=0.03"
@@ -208,6 +211,7 @@ def test_it_is_not_what_the_model_lacked():
     assert less.startswith("Not all explained: something")
 
 
+@pytest.mark.slow
 def test_what_is_left_is_not_called_noise_then(monkeypatch: pytest.MonkeyPatch):
     usual = found(UNEVEN, UNEVEN)
     assert usual.evidence[0].shown
@@ -289,6 +293,7 @@ def test_one_that_is_neither_shown_nor_refuted_is_said_to_be_unconfirmed():
     )
 
 
+@pytest.mark.slow
 def test_what_correcting_makes_of_noise_is_nothing_of_a_delay():
     """Shifted by a delay, noise makes a change of its own, of which a half was taken for seen: 0.58 of a delay that is there."""
     effect, random = "time_delay:delay=0.006", np.random.default_rng(4)

@@ -42,6 +42,7 @@ def found(size: float) -> Diagnosis:
     )
 
 
+@pytest.mark.slow
 def test_a_push_says_nothing_of_an_effect():
     """Its stretch counted as what moments of motions differ by."""
     usual, disturbed = found(0.0), found(3.0)
@@ -58,6 +59,7 @@ def test_a_push_says_nothing_of_an_effect():
     assert other.borne_out()
 
 
+@pytest.mark.slow
 def test_errors_are_of_all_that_was_recorded():
     """What is left out for the evidence stays in the figures that are given."""
     usual, disturbed = found(0.0), found(3.0)
@@ -100,6 +102,7 @@ def test_of_one_recording_runs_are_not_known_to_differ():
     assert result.verdict == "undecided"
 
 
+@pytest.mark.slow
 def test_what_runs_differ_by_excuses_no_error_that_is_none_of_it(monkeypatch: pytest.MonkeyPatch) -> None:
     """`complete` stood beside 2.9 times the training's error, "as runs were found to differ": in delays, of which it was none."""
     seen: list[Validation] = []

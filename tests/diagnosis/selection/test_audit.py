@@ -97,6 +97,7 @@ def test_a_spring_of_the_arm_stands(monkeypatch: pytest.MonkeyPatch):
     assert outdone(proxy, found.step.weights, (held.refused(""),)) == []
 
 
+@pytest.mark.slow
 def test_of_those_that_act_together_one_falls_in_whose_place_another_explains_more():
     """A gear of joint1 of 34,467 +- 15,126 N m/rad was believed for joint2's, which helped in two of four motions, not in three."""
     arm, family = replace(virtual_arm(), torque_noise=np.array(NOISE)), JointElasticity()
@@ -120,6 +121,7 @@ class SpringTogether(Spring):
     together = True
 
 
+@pytest.mark.slow
 def test_of_those_that_act_together_one_whose_size_is_not_told_falls(monkeypatch: pytest.MonkeyPatch):
     made = exact_runs()
     for joint in (0, 1):
@@ -244,6 +246,7 @@ def test_an_effect_beside_it_stays():
     assert superfluous(found, found.step.weights, others) == []
 
 
+@pytest.mark.slow
 def test_a_ripple_of_too_few_periods_is_told_and_not_believed():
     # Once per turn of a joint whose gear is not known, of which the motion has 0.6 turns: a spring takes its place.
     robot = replace(load_robot(), reduction=np.ones(2))
@@ -347,6 +350,7 @@ class Impossible(Spring):
         return {}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("share", "believed"), [(0.0, True), (0.2, True), (1.0, False)])
 def test_what_no_arm_has_refuses_what_stands_for_it(share: float, believed: bool):
     """A cable's hysteresis was believed a spring, though a presliding of a part of the friction explained twice as much."""

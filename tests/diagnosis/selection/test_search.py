@@ -155,6 +155,7 @@ def test_weights_of_the_fit_make_joints_equal():
     assert weighted[0] == pytest.approx(weighted[1], rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_search_again_without_an_effect_is_one_that_never_had_it():
     runs = with_torque(with_torque(exact_runs(), 1, spring), 0, asymmetry)
     first = searched(runs, *SMALL)

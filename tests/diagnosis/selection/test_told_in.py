@@ -65,6 +65,7 @@ def test_what_was_tried_beside_it_is_judged_there_and_comes_in_nowhere() -> None
     assert [each.gain for each in others] == pytest.approx([each.gain for each in alone])
 
 
+@pytest.mark.slow
 def test_what_was_taken_out_of_the_data_stays_out_and_is_in_the_base_model_before_it() -> None:
     found = searched(sprung_runs(0.006), Spring(), TimeDelay())
     assert found.correction is not None

@@ -30,6 +30,7 @@ def slow(rng: np.random.Generator, count: int, rows: int = ROWS) -> np.ndarray:
     return np.sin(2 * np.pi * t * rng.uniform(0.004, 0.03, count) + rng.uniform(0, 6, count))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("memory", [0.0, 0.8])
 def test_the_p_value_is_uniform_where_nothing_is_missing(memory: float):
     rng = np.random.default_rng(1)
@@ -45,6 +46,7 @@ def test_the_p_value_is_uniform_where_nothing_is_missing(memory: float):
     assert 0.02 <= np.mean(p < 0.05) <= 0.09
 
 
+@pytest.mark.slow
 def test_a_textbook_test_would_call_correlated_noise_an_effect():
     """The power of the check above: without blocks every other p-value is below 5 %."""
     rng = np.random.default_rng(1)
@@ -281,6 +283,7 @@ def by_all_rows(model: FittedModel, candidate: Rows) -> Examination:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(8))
 def test_it_is_what_all_rows_of_all_joints_say(seed: int):
     model, candidates = uneven_blocks(seed)

@@ -39,6 +39,7 @@ def test_a_column_of_few_places_that_removes_nearly_all_is_beyond_doubt(blocks: 
     assert abs(error[0]) < 4.0 * np.sqrt(again.covariance[0, 0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("memory", [0.5, 2.5])
 def test_of_noise_hardly_any_is_significant(memory: float):
     rng = np.random.default_rng(7)

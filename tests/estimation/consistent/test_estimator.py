@@ -257,6 +257,7 @@ def test_slow_stroke_of_the_cases_predicts_the_paper_trajectory():
     assert [choice.shape for choice in found.shapes] == ["lubricated", "lubricated"]
 
 
+@pytest.mark.slow
 @one_blas_thread()
 def test_ur10e_measured_is_possible_and_predicts_as_well():
     robot = load_robot(shared_path("data", "ur10e", "robot.yaml"))

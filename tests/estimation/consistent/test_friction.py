@@ -45,6 +45,7 @@ def on_grid(p: BrakingPolynomial, values: np.ndarray, end: float) -> tuple[float
     return float(np.min(f)), float(np.max(f))
 
 
+@pytest.mark.slow
 @settings(max_examples=25)
 @given(st.integers(0, 100_000), st.sampled_from([(0, 1), (0, 1, 2), (0, 1, 2, 3)]))
 def test_the_certificate_says_what_a_fine_grid_says(seed, powers):

@@ -97,6 +97,7 @@ def test_runs_that_repeat_what_they_leave_count_once():
     assert apart.effective == pytest.approx(4.0 * same.effective)
 
 
+@pytest.mark.slow
 def test_true_shapes_are_seldom_contradicted():
     """At the shape's edge, where friction is linear, noise breaks it in most draws; the test's size holds there."""
     value = friction(a21=0.0, a22=0.0, a31=0.0, a32=0.0)

@@ -63,12 +63,14 @@ def test_kernel_agrees_with_pinocchio_and_knows_its_structural_zeros(name: str) 
     np.testing.assert_array_equal(build_kernel(model).pattern, expected > 1e-12)
 
 
+@pytest.mark.slow
 @settings(max_examples=80)
 @given(seed=st.integers(0, 2**32 - 1), bodies=st.integers(1, 6))
 def test_kernel_agrees_with_pinocchio_on_random_trees(seed: int, bodies: int) -> None:
     assert_agrees(random_model(seed, bodies), samples=10)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("joints", [12, 17, 23, 30, 40])
 def test_kernel_agrees_with_pinocchio_on_long_chains(joints: int) -> None:
     assert_agrees(random_chain(joints, joints), samples=8)
@@ -286,6 +288,7 @@ def wrong_kernel(fault: str, model: pin.Model) -> RegressorKernel:
     return regressor._emit_kernel(joints, gravity, None)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", ["parent", "axis", "kind", "gravity"])
 def test_a_kernel_of_a_wrong_model_is_refused(fault: str) -> None:
     model = load("panda")

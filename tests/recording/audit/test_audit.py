@@ -37,6 +37,7 @@ def test_faults_add_up_and_rows_are_named_as_in_the_file(read):
     np.testing.assert_array_equal(recording.effort[1], np.delete(made["joint2.effort"], [10, 20, 30]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("folder", "count", "expected"),
     [
@@ -74,6 +75,7 @@ def test_measured_recordings_in_degrees_are_refused(tmp_path):
         read_recording(path, arm)
 
 
+@pytest.mark.slow
 def test_the_cases_are_read_without_a_finding(robot):
     folders = sorted(shared_path("cases").glob("*/train"))
     for folder in folders:

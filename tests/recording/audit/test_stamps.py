@@ -65,6 +65,7 @@ def test_a_late_stamp_within_a_microsecond_of_the_next_is_too():
     assert misplaced(samples, even()) < 0.01
 
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None)
 @given(st.integers(0, 1000), st.floats(0.06, 0.25))
 def test_jitter_is_whose_the_positions_say(seed: int, size: float):

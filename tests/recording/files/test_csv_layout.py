@@ -72,6 +72,7 @@ def test_what_is_no_table_has_a_layout_too(tmp_path):
         csv_layout(path)
 
 
+@pytest.mark.slow
 @given(
     separator=st.sampled_from([";", "\t", ",", " "]),
     before=st.lists(st.sampled_from(["", "a log", "Samples;3", "Rate\t10", "# remark, of two parts"]), max_size=4),

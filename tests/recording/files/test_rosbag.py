@@ -18,6 +18,7 @@ from tests.recording.files.made import MADE, assert_same, described, expected
 from tests.recording.made import refusal
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
 def test_a_rosbag2_folder_is_one_recording_and_needs_no_mapping(tmp_path, storage):
     bag = write_bag(tmp_path / "run_2", MADE, storage=storage)
@@ -74,6 +75,7 @@ def test_unstamped_messages_are_refused_and_read_by_the_recorders_clock(tmp_path
     assert_same(read_recording(bag, robot), expected(tmp_path), clock=1e-9)
 
 
+@pytest.mark.slow
 def test_a_damaged_bag_is_refused_in_a_line(tmp_path):
     bag = write_bag(tmp_path / "run", MADE)
     (file,) = bag.glob("*.mcap")

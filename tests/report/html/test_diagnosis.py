@@ -14,6 +14,7 @@ from scara_ident.report.html.diagnosis import DiagnosisContext, _interval_table,
 from tests.report.html.document import data_of, document
 
 
+@pytest.mark.slow
 def test_a_diagnosis_tells_the_story_from_effect_to_gain(diagnosed):
     found = document(diagnosed)
     shown = [name for name in found.sections if name not in ("tentative", "variation")]
@@ -26,6 +27,7 @@ def test_a_diagnosis_tells_the_story_from_effect_to_gain(diagnosed):
     assert "Effects that the model absorbs on any data" in found.words
 
 
+@pytest.mark.slow
 def test_the_residual_before_follows_what_the_effect_adds(diagnosed):
     """On the added-variable plot the slope of the residual is 1 before and 0 after."""
     data = data_of(diagnosed)

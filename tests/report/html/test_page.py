@@ -18,6 +18,7 @@ PAGES = (
 )  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", PAGES)
 def test_a_page_is_closed_html_that_loads_nothing(pages, kind):
     found = document(pages[kind])

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import pytest
+
 from tests.results import Results
 
 
+@pytest.mark.slow
 def test_a_comparison_tells_every_error(results: Results):
     found = results.comparison
     frame = found.to_frame()

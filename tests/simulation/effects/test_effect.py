@@ -63,6 +63,7 @@ def test_an_effect_of_no_size_is_no_effect_at_all() -> None:
         np.testing.assert_array_equal(result.recording.effort, plain.recording.effort, err_msg=effect.name)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("urdf", [None, "ur5_robot.urdf"])
 def test_every_effect_runs_with_its_own_sizes_and_is_felt(urdf: str | None) -> None:
     arm = scara() if urdf is None else ideal(virtual_arm(load_robot(example_urdf(urdf))))
