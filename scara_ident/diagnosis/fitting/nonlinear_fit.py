@@ -130,7 +130,8 @@ def _is_cut(state: Linearised, way: Array) -> bool:
 
 def _kept(before: Linearised, after: Linearised, way: Array) -> float:
     """Return the share of what the linear model promised that a way kept; negative where the error rose."""
-    promised = max(before.gain(way), np.finfo(float).tiny)
+    # A promise is a share of the error: one below rounding is none.
+    promised = max(before.gain(way), np.finfo(float).eps)
     return (before.error - after.error) / (promised * before.error)
 
 

@@ -15,7 +15,7 @@ from scara_ident.diagnosis.candidates.unknowns import Unknown
 from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.fitting.effect_parameters import physical_parameters
 from scara_ident.diagnosis.fitting.linearised import Linearised, freed_model, linearise
-from scara_ident.diagnosis.fitting.nonlinear_fit import _is_short, tune
+from scara_ident.diagnosis.fitting.nonlinear_fit import _is_short, _kept, tune
 from scara_ident.diagnosis.testing.selection_step import SelectionStep
 from scara_ident.effects import Member, effects_named
 from scara_ident.effects.elasticity import Backlash, JointElasticity
@@ -389,3 +389,10 @@ def test_a_strong_effect_whose_columns_follow_the_estimate_settles() -> None:
     runs = [replace(run, effort=run.effort + np.outer([0.0, cubic], run.effort[1] ** 3)) for run in exact_runs()]
     step = tuned(runs, Candidate(TorqueSensorNonlinearity(), Member(1)))
     assert linear(step).value[-1] == pytest.approx(cubic, rel=0.05)
+
+
+@pytest.mark.parametrize(("left", "sign"), [(100.0, -1.0), (0.5, 1.0)])
+def test_a_way_that_promises_nothing_is_judged_without_overflow(left: float, sign: float):
+    before = SimpleNamespace(error=np.float64(1.0), gain=lambda _: 0.0)
+    kept = _kept(before, SimpleNamespace(error=np.float64(left)), np.zeros(1))
+    assert np.isfinite(kept) and np.sign(kept) == sign
