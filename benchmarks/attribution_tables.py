@@ -119,14 +119,17 @@ def _by_effect(by_kind: dict[str, list[Item]], limits: dict[str, float]) -> None
 
 
 def effect_errors(item: Item) -> list[float]:
-    """Return the errors of the parameters of true effects that were found, in standard deviations."""
+    """Return the errors of the parameters of true effects that were found, in standard deviations.
+
+    How late recordings are is what their runs are late by too.
+    """
     errors = []
     for true in item["true"]:
         for found in item["found"]:
             if (found["effect"], found["joint"]) != (true["effect"], true["joint"]):
                 continue
             for name, (value, std) in found["parameters"].items():
-                exact = true["parameters"].get(name)
+                exact = item["late"] if name == "delay" and "late" in item else true["parameters"].get(name)
                 if exact is None or value is None or not std or not np.isfinite(std):
                     continue
                 error = float(np.angle(np.exp(1j * (value - exact)))) if name == "phase" else value - exact

@@ -62,3 +62,10 @@ def test_the_interval_of_a_share_counts_sets_and_not_parameters(tables: ModuleTy
     low, high = tables._interval([[0.0] * 30, [3.0] * 10] * 4)
     assert low < 0.6 and high > 0.85
     assert tables._interval([[0.0], [-1.0]]) == (1.0, 1.0)
+
+
+def test_a_delay_is_right_that_is_what_runs_are_late_by_too(tables: ModuleType) -> None:
+    delay = {"effect": "time_delay", "joint": None, "parameters": {"delay": 0.0077}}
+    found = [delay | {"parameters": {"delay": [0.0107, 0.0005], "delay_M1_1": [0.0093, 0.0004]}}]
+    assert tables.effect_errors({"true": [delay], "found": found, "late": 0.0106}) == pytest.approx([0.2])
+    assert tables.effect_errors({"true": [delay], "found": found}) == pytest.approx([6.0])
