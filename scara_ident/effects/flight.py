@@ -173,7 +173,7 @@ def flank(drift: Array, width: float, step: float) -> tuple[Array, list[Flight]]
         free flight between them.
     """
     count = len(drift)
-    result, flights = np.empty(count), []
+    result, flights, gains = np.empty(count), [], _gains(drift, step)
     now, side = 0, 1.0 if drift[0] >= 0.0 else -1.0
     # Where the sign changes to positive, and to negative.
     changes = {
@@ -190,28 +190,42 @@ def flank(drift: Array, width: float, step: float) -> tuple[Array, list[Flight]]
             if leaves == count:
                 break
             since = float(drift[leaves] / (drift[leaves] - drift[leaves - 1]))
-        now, lands = _fly(drift, leaves, since, side, width, step, result)
+        now, lands = _fly(drift, gains, leaves, since, side, width, step, result)
         flights.append(Flight(leaves, now, side, since))
         side = lands
     return result, flights
 
 
 def _fly(
-    drift: Array, first: int, since: float, side: float, width: float, step: float, result: Array
+    drift: Array,
+    gains: tuple[Array, Array],
+    first: int,
+    since: float,
+    side: float,
+    width: float,
+    step: float,
+    result: Array,
 ) -> tuple[int, float]:
     """Fill the flight that begins at a sample, and return the sample at which it has ended, and on which flank."""
     reach = REACH
     while True:
+        # A recording may have hundreds of short flights: what is the same in all of them is made before.
         stop = min(first + reach, len(drift))
-        way = 0.5 * side + _apart(drift[first:stop], since * step, step, from_none=True) / width
+        some = slice(first, stop - 1)
+        way = _way(drift[first : first + 1], (gains[0][some], gains[1][some]), since * step, step, from_none=True)
+        way /= width
+        way += 0.5 * side
         # The first sample has hardly left its flank.
-        landed = np.flatnonzero(np.abs(way[1:]) >= 0.5) + 1
-        if len(landed) or stop == len(drift):
+        landed = np.abs(way[1:]) >= 0.5
+        end = int(landed.argmax()) + 1 if len(landed) else 0
+        found = end > 0 and bool(landed[end - 1])
+        if found or stop == len(drift):
             break
         reach *= 4
-    end = int(landed[0]) if len(landed) else len(way)
-    result[first : first + end] = np.clip(way[:end], -0.5, 0.5)
-    return first + end, side if not len(landed) else float(np.sign(way[end]))
+    if not found:
+        end = len(way)
+    np.minimum(np.maximum(way[:end], -0.5), 0.5, out=result[first : first + end])
+    return first + end, float(np.sign(way[end])) if found else side
 
 
 def _apart(drift: Array, since: float, step: float, *, from_none: bool) -> Array:
@@ -219,9 +233,26 @@ def _apart(drift: Array, since: float, step: float, *, from_none: bool) -> Array
 
     It is linear from sample to sample; before the first it grew from none, or was as large.
     """
-    first = drift[..., :1]
+    return _way(drift[..., :1], _gains(drift, step), since, step, from_none=from_none)
+
+
+def _gains(drift: Array, step: float) -> tuple[Array, Array]:
+    """Return by how much speed and way grow from sample to sample of what an acceleration moves, the way without its speed."""
+    before, after = drift[..., :-1], drift[..., 1:]
+    return 0.5 * step * (after + before), step**2 * (before / 3.0 + after / 6.0)
+
+
+def _way(first: Array, gains: tuple[Array, Array], since: float, step: float, *, from_none: bool) -> Array:
+    """Return what `_apart` does, of the first acceleration and the gains."""
     speed, way = (first * since / 2.0, first * since**2 / 6.0) if from_none else (first * since, first * since**2 / 2.0)
-    speeds = speed + np.cumsum(0.5 * step * (drift[..., 1:] + drift[..., :-1]), axis=-1)
-    before = np.concatenate([speed, speeds[..., :-1]], axis=-1)[..., : drift.shape[-1] - 1]
-    ways = way + np.cumsum(step * before + step**2 * (drift[..., :-1] / 3.0 + drift[..., 1:] / 6.0), axis=-1)
-    return np.asarray(np.concatenate([way, ways], axis=-1))
+    result = np.empty((*first.shape[:-1], gains[0].shape[-1] + 1))
+    result[..., :1] = way
+    ways = result[..., 1:]
+    ways[..., :1] = speed
+    np.add.accumulate(gains[0][..., :-1], axis=-1, out=ways[..., 1:])
+    ways[..., 1:] += speed
+    ways *= step
+    ways += gains[1]
+    np.add.accumulate(ways, axis=-1, out=ways)
+    ways += way
+    return result
