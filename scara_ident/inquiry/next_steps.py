@@ -62,7 +62,11 @@ class NextStep:
 
     def sentence(self) -> str:
         """Say it for a person."""
-        said = f"{capital(self.question)}: "
+        return capital(self.within())
+
+    def within(self) -> str:
+        """Say it after a colon."""
+        said = f"{self.question}: "
         if self.asked is None:
             return f"{said}{self.motion}{'' if self.seconds is None else f' ({self.seconds:.0f} s)'}."
         now = "" if self.sigma_before is None else f"; {self.sigma_before:.2g} standard errors apart so far"

@@ -52,7 +52,7 @@ def _others(diagnosis: Diagnosis) -> list[str]:
             others = ", ".join(confounder.label for confounder in effect.confounded_with)
             found.append(f"These recordings cannot tell it from: {others}.")
     if diagnosis.verdict == "undecided":
-        found += _not_shown(diagnosis.evidence)
+        found += [*_to_do_first(diagnosis), *_not_shown(diagnosis.evidence)]
     if diagnosis.effects:
         found += _errors(diagnosis)
     for guess in diagnosis.tentative:
@@ -90,8 +90,12 @@ def _headline(diagnosis: Diagnosis) -> list[str]:
             f"no effect of the catalogue accounts for it{_as_no_arm(diagnosis, remainder)}{_curved(diagnosis, remainder)}."
         )
         if not remainder.signals:
-            found += [f"To do first: {step.sentence()}" for step in next_steps(diagnosis)[:1]]
+            found += _to_do_first(diagnosis)
     return found
+
+
+def _to_do_first(diagnosis: Diagnosis) -> list[str]:
+    return [f"To do first: {step.within()}" for step in next_steps(diagnosis)[:1]]
 
 
 def _errors(diagnosis: Diagnosis) -> list[str]:

@@ -73,18 +73,19 @@ def test_what_says_the_law_has_no_uncertainty():
     assert quantity("exponent", Parameter(1.0, 0.0, "1")) == "exponent 1"
 
 
-def test_where_it_cannot_be_told_the_first_sentence_says_so(result):
+def test_where_it_cannot_be_told_the_first_sentence_says_so_then_what_to_do_and_why(result):
     unsure = replace(result.evidence[0], shown=False, by="", why="it is not white")
     undecided = replace(result, verdict="undecided", evidence=(unsure, result.evidence[1]), effects=())
-    first, second, *_ = sentences(undecided)
+    first, second, third, *_ = sentences(undecided)
     assert first == "Undecided: these recordings cannot tell whether something is missing."
-    assert second == "On joint1: it is not white."
+    assert second == f"To do first: {next_steps(undecided)[0].within()}"
+    assert third == "On joint1: it is not white."
     both = (
         replace(unsure, why="76% of it is not white"),
         replace(unsure, joint="joint2", why="26% of it is not white"),
     )
-    assert sentences(replace(undecided, evidence=both))[1] == "On joint1, joint2: 26% to 76% of it is not white."
-    assert sentences(replace(undecided, evidence=both[:1]))[1] == "On joint1: 76% of it is not white."
+    assert sentences(replace(undecided, evidence=both))[2] == "On joint1, joint2: 26% to 76% of it is not white."
+    assert sentences(replace(undecided, evidence=both[:1]))[2] == "On joint1: 76% of it is not white."
     lacking = replace(undecided, evidence=(replace(unsure, lacks=True), result.evidence[1]))
     assert sentences(lacking)[0] == "Undecided: something is missing, on joint1, that these recordings cannot name."
     assert diagnosis_dict(lacking)["evidence"]["joint1"]["lacks"] is True
@@ -146,7 +147,7 @@ def test_the_verdict_comes_first_then_what_was_found_then_why_not_more_and_what_
     """The line of a report that stands out was that of an effect worth a look, above what is unexplained."""
     guess = TentativeEffect("time_delay", None, "a delay", "could be chance", "two speeds", 0.01, 0.2, None)
     starts = {
-        "undecided": ["Undecided", "Found spring", "On joint1", "Rms error", "Worth a look"],
+        "undecided": ["Undecided", "Found spring", "To do first", "On joint1", "Rms error", "Worth a look"],
         "unexplained": ["Unexplained", "Found spring", "Rms error", "Worth a look"],
     }
     doubted = tuple(replace(item, shown=False, why="record more") for item in result.evidence)
@@ -163,7 +164,7 @@ def test_where_what_is_left_depends_on_no_signal_it_is_said_what_to_do_first(res
     left = replace(result, verdict="unexplained", unexplained=Unexplained("joint1", (), 0.1, 0.0))
     said = sentences(left)
     place = next(k for k, words in enumerate(said) if words.endswith("no effect of the catalogue accounts for it."))
-    assert said[place + 1] == f"To do first: {next_steps(left)[0].sentence()}"
+    assert said[place + 1] == f"To do first: {next_steps(left)[0].within()}"
     shown = replace(left, unexplained=Unexplained("joint1", ("position of joint1",), 0.1, 0.5))
     assert not any(words.startswith("To do first") for words in sentences(shown))
 
