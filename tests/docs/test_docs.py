@@ -305,7 +305,7 @@ def test_what_the_readme_says_of_the_diagnosis_adds_up_from_its_page() -> None:
                 ("SCARA03, UR5, Panda (3711, 3621, 3701)", first[:4]),
                 ("SCARA03, UR5, Panda (3801 to 4092)", total[:4]),
                 ("nine, six of them new to it (7101 to 7512)", nine),
-                ("SCARA03, UR5 (9901 to 9904)", last),
+                ("SCARA03, UR5, Panda, Kinova, xArm7 (9901 to 9973)", last),
             )
         ),
         f"| {alone[0]} | SCARA03, UR5, Panda, nothing missing (3721 to 3723) | {alone[1]} | |",
