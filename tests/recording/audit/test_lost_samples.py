@@ -75,3 +75,38 @@ def test_a_source_that_is_late_now_and_then_has_lost_nothing():
     position = whole.position.copy()
     position[:, 1:][:, late[1:]] = whole.position[:, :-1][:, late[1:]]
     assert restamped(Samples("a.csv", ROBOT, whole.time, position, None, whole.row))[1] == []
+
+
+@pytest.mark.parametrize("at_once", [2, 3, 4, 25])
+@pytest.mark.parametrize("step", [0.0, 1e-5])
+def test_several_samples_lost_at_once_are_refused_with_their_number(at_once: int, step: float):
+    """A logger that drew a plot every 0.1 s stood still for 45 ms; the jumps' shadows looked like samples that were late."""
+    with pytest.raises(RecordingError, match=f"by the way of about {at_once} samples") as caught:
+        restamped(stalled(moved(step=step), at_once))
+    missing = re.search(r"in all about ([0-9.]+) are missing for every 100", str(caught.value))
+    assert missing is not None
+    assert float(missing[1]) == pytest.approx(100 * at_once / (50 - at_once), rel=0.1)
+
+
+def test_stalls_are_seen_beside_a_source_that_is_late():
+    """Of the same log 3 % of the rows held the row before, and the next ones jumped ahead by two samples."""
+    whole = stalled(moved(step=0.0), 25)
+    late = np.random.default_rng(2).random(whole.count) < 0.05
+    position = whole.position.copy()
+    position[:, 1:][:, late[1:]] = whole.position[:, :-1][:, late[1:]]
+    with pytest.raises(RecordingError, match="samples are lost"):
+        restamped(Samples("a.csv", ROBOT, whole.time, position, None, whole.row))
+
+
+def test_joints_that_are_slow_against_their_noise_show_long_stalls():
+    whole = moved(step=2e-3)
+    assert restamped(whole)[1] == []
+    with pytest.raises(RecordingError, match="samples are lost"):
+        restamped(stalled(whole, 25))
+
+
+def stalled(whole: Samples, at_once: int) -> Samples:
+    """The same, as a logger writes it that waits for so many of every 50 samples and counts on."""
+    kept = np.arange(whole.count) % 50 >= at_once
+    rows = np.arange(1, np.count_nonzero(kept) + 1)
+    return Samples("a.csv", ROBOT, INTERVAL * rows, whole.position[:, kept], None, rows)
