@@ -14,7 +14,15 @@ from scara_ident.inspection.chain import is_still, with_locked
 from scara_ident.inspection.names import CURRENT, LINK_SIDE, TORQUE, Meaning, nameless
 from scara_ident.inspection.second_encoder import second_encoder
 from scara_ident.inspection.signals import Signal, groups, of_group
-from scara_ident.inspection.values import Reading, averages, position_readings, slopes, time_unit, velocity_reading
+from scara_ident.inspection.values import (
+    Reading,
+    averages,
+    one_multiple,
+    position_readings,
+    slopes,
+    time_unit,
+    velocity_reading,
+)
 from scara_ident.recording.one_clock import on_one_clock
 from scara_ident.robot.robot import Robot
 from scara_ident.robot.units import COUNT, DRIVE, TIME, Unit, find_unit, table_of
@@ -278,7 +286,11 @@ def _find_velocity_unit(
         if not group:
             continue
         recorded = averages(time, np.array([numbers[velocity.columns[k]][good] for k in group]))
-        reading = velocity_reading(np.array([slope[k] for k in group]), recorded, robot.reduction[group], linear=linear)
+        known = np.array([slope[k] for k in group])
+        reading = velocity_reading(known, recorded, robot.reduction[group], linear=linear)
+        if reading is None and one_multiple(known, recorded):
+            # The audit says the factor, here and wherever the recording is read.
+            reading = Reading(_si(robot, "velocity", group[0]))
         if reading is None:
             result.notes.append("velocity: no slope of the positions in any unit; left out")
             del result.signals["velocity"]

@@ -20,6 +20,8 @@ WIDEST, FASTEST_JOINT = 2 * TURN, 4 * TURN
 LONGEST, FASTEST_SLIDE = 10.0, 10.0
 # A recorded velocity is that of the position where it correlates so well with its slope, and fits within this share.
 ALIKE, NEAR = 0.9, 0.1
+# Of a clock that runs at another rate it is another multiple of the slope, alike on all joints within this share.
+SAME = 0.05
 
 
 @dataclass(frozen=True)
@@ -78,6 +80,32 @@ def velocity_reading(slope: Array, velocity: Array, reduction: Array, *, linear:
     linear : bool
         Whether the joints translate.
     """
+    ratios = _ratios(slope, velocity)
+    if ratios is None:
+        return None
+    moving = np.std(slope, axis=1) > 0
+    for side in ("joint", "motor"):
+        gear = reduction[moving] if side == "motor" else np.ones(len(ratios))
+        for name, unit in table_of("velocity", linear=linear and side == "joint").items():
+            if not name.startswith(COUNT) and np.all(np.abs(ratios * unit.factor / gear - 1) < NEAR):
+                return Reading(name, side)
+    return None
+
+
+def one_multiple(slope: Array, velocity: Array) -> bool:
+    """Tell whether recorded velocities are one multiple of the slopes of the positions, as of a clock at another rate.
+
+    Parameters
+    ----------
+    slope, velocity : ndarray, shape (k, M)
+        As of `velocity_reading`.
+    """
+    ratios = _ratios(slope, velocity)
+    return ratios is not None and bool(np.all(np.abs(ratios / np.median(ratios) - 1.0) < SAME))
+
+
+def _ratios(slope: Array, velocity: Array) -> Array | None:
+    """Return recorded velocity per slope of every joint that moves; None where one of them is not its slope."""
     moving = np.std(slope, axis=1) > 0
     if not moving.any() or not np.isfinite(velocity[moving]).all():
         return None
@@ -86,12 +114,7 @@ def velocity_reading(slope: Array, velocity: Array, reduction: Array, *, linear:
         if np.std(recorded) == 0 or abs(np.corrcoef(known, recorded)[0, 1]) < ALIKE:
             return None
         ratios[k] = float(known @ recorded) / float(known @ known)
-    for side in ("joint", "motor"):
-        gear = reduction[moving] if side == "motor" else np.ones(len(ratios))
-        for name, unit in table_of("velocity", linear=linear and side == "joint").items():
-            if not name.startswith(COUNT) and np.all(np.abs(ratios * unit.factor / gear - 1) < NEAR):
-                return Reading(name, side)
-    return None
+    return ratios
 
 
 def slopes(time: Array, values: Array) -> Array:
