@@ -136,10 +136,10 @@ def _find_time(result: Guess, meanings: Mapping[str, Meaning], numbers: Mapping[
     named.sort(key=lambda name: CLOCKS.index(name.lower()) if name.lower() in CLOCKS else len(CLOCKS))
     others = [name for name, said in meanings.items() if said.quantity is None and name in numbers]
     for name in (*named, *others):
-        seen = time_unit(numbers[name])
+        said = meanings[name].unit
+        seen = time_unit(numbers[name], said)
         if seen is None or (name in others and np.any(np.diff(numbers[name]) <= 0)):
             continue
-        said = meanings[name].unit
         result.time, result.time_unit = name, seen
         if said is not None and said != seen:
             result.notes.append(f"{name!r} says {said}, and its steps look like {seen}: {seen} taken")
