@@ -25,7 +25,7 @@ def inspect(
     file: Annotated[
         Path,
         typer.Argument(
-            metavar="FILE", help="A recording: .parquet, .csv, .mat, .h5, .mcap, .db3, or a rosbag2 folder."
+            metavar="FILE", help="A recording: .parquet, .csv, .mat, .npz, .h5, .mcap, .db3, or a rosbag2 folder."
         ),
     ],
     urdf: Annotated[
