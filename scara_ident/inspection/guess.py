@@ -13,7 +13,7 @@ from scara_ident.arrays import Array
 from scara_ident.inspection.chain import is_still, with_locked
 from scara_ident.inspection.names import CURRENT, LINK_SIDE, TORQUE, Meaning, nameless
 from scara_ident.inspection.second_encoder import second_encoder
-from scara_ident.inspection.signals import Signal, groups, of_group
+from scara_ident.inspection.signals import Signal, groups, of_group, short_together
 from scara_ident.inspection.values import (
     Reading,
     averages,
@@ -95,6 +95,7 @@ def guess(
         if signal is not None:
             result.signals[quantity] = signal
             beside = beside or signal.template
+    result.notes = short_together(result.notes)
     position, effort = result.signals.get("position"), result.signals.get("effort")
     if position is None:
         listed = (
