@@ -25,7 +25,7 @@ AHEAD = 5.0
 SHADOW = 0.6
 # So many samples that are usually lost at once are told: such a log waits for something now and then, as for a plot.
 SEVERAL = 2
-# Beyond this share of the steps velocities and accelerations are not those of the arm; below it, it is said ...
+# Beyond this share of the steps, or of the samples, velocities and accelerations are not those of the arm; below it, it is said ...
 MOST = 0.01
 # ... from this share on, and from so many.
 LEAST, FEWEST = 1e-3, 3
@@ -50,11 +50,11 @@ def restamped(samples: Samples) -> Checked:
 def _judged(samples: Samples, missing: Array, least: float) -> Finding | None:
     """Say what is lost where so many samples are missing in each step, shape (N - 1,), NaN where that is not known."""
     total = int(np.count_nonzero(np.isfinite(missing)))
-    ahead, back = missing > least, (missing < -least) & ~_shadows(missing)
+    ahead, back = ((sign * missing > least) & ~_shadows(sign * missing) for sign in (1.0, -1.0))
     # A late sample jumps back, and the next one ahead by as much.
     count = int(np.count_nonzero(ahead)) - int(np.count_nonzero(back))
     lost, late = float(np.sum(missing[ahead])), -float(np.sum(missing[back]))
-    share = count / max(total, 1)
+    share, gone = count / max(total, 1), (lost - late) / max(total, 1)
     if total < ENOUGH or count < max(FEWEST, LEAST * total) or lost < AHEAD * late:
         return None
     usual = round(float(np.median(np.sort(missing[ahead])[np.count_nonzero(back) :])))
@@ -62,10 +62,10 @@ def _judged(samples: Samples, missing: Array, least: float) -> Finding | None:
         f"samples are lost and the clock was made even over it: "
         f"{'all joints jump' if len(samples.position) > 1 else 'the joint jumps'} ahead by the way of "
         f"{'a sample or more' if usual < SEVERAL else f'about {usual} samples'} in {100 * share:.2g} % of the steps in motion, "
-        f"first before {samples.where(int(np.argmax(ahead)) + 1)}, and in all about {100 * (lost - late) / total:.2g} are missing "
+        f"first before {samples.where(int(np.argmax(ahead)) + 1)}, and in all about {100 * gone:.2g} are missing "
         "for every 100 recorded"
     )
-    if share > MOST:
+    if max(share, gone) > MOST:
         samples.refuse(f"{what}; record again, with the time at which each sample was taken")
     return Finding("restamped", f"{what}: used as it is ({several(count, 'jump')})", count)
 
@@ -74,13 +74,13 @@ def _missing(samples: Samples) -> tuple[Array, Array]:
     """Estimate how many samples are missing in each step, and their std, shapes (N - 1,); NaN where nothing tells it.
 
     A sample that is missing shifts what comes after by the way of one step. Of every joint the jump and the way of a step
-    come from fits of the same samples; each joint counts by how large its way is against the jumps that it usually shows.
+    come from the same fit, and where the jump is in its middle the way has nothing of it; each joint counts by how large its way is against the jumps that it usually shows.
     """
     place = np.arange(0.5 - SIDE, SIDE)
     fit = np.linalg.pinv(np.column_stack([np.ones_like(place), place, place**2, place > 0]))
     window = sliding_window_view(samples.position, 2 * SIDE, axis=1)
-    way, jump = _undisturbed(window @ fit[1]), window @ fit[3]
-    moving = np.abs(way) > MOVING * np.sqrt(np.mean(way**2, axis=1, keepdims=True))
+    way, jump = window @ fit[1], window @ fit[3]
+    moving = np.abs(way) > MOVING * np.sqrt(np.mean(_undisturbed(way) ** 2, axis=1, keepdims=True))
     weight, idle = np.zeros_like(way), samples.idle()
     for j, inside in enumerate(moving):
         # Of a joint that stands still all is rounding.
@@ -99,19 +99,19 @@ def _missing(samples: Samples) -> tuple[Array, Array]:
 
 
 def _undisturbed(way: Array) -> Array:
-    """Return the way of each step, shape (n, M), without what a jump within the window adds: the least one around it."""
+    """Return how far each step goes, shape (n, M), without what a jump beside its middle adds: the least way around it."""
     around = sliding_window_view(np.pad(np.abs(way), ((0, 0), (SIDE - 1, SIDE - 1)), mode="edge"), 2 * SIDE - 1, axis=1)
-    return np.asarray(np.copysign(np.min(around, axis=2), way))
+    return np.asarray(np.min(around, axis=2))
 
 
 def _shadows(missing: Array) -> NDArray[np.bool_]:
-    """Tell which steps jump back only as far as the fit there does that shares most of its samples with one that jumps ahead.
+    """Tell which steps jump ahead only as far as the fit there does that shares most of its samples with one that jumps back.
 
-    Of three samples lost at once two such steps were as many late ones.
+    With the signs exchanged, two such steps beside three samples lost at once were as many late ones.
     """
-    ahead = np.maximum(np.nan_to_num(missing), 0.0)
-    around = np.max(sliding_window_view(np.pad(ahead, SIDE - 1), 2 * SIDE - 1), axis=1)
-    return np.asarray(-missing < SHADOW * around)
+    back = np.maximum(-np.nan_to_num(missing), 0.0)
+    around = np.max(sliding_window_view(np.pad(back, SIDE - 1), 2 * SIDE - 1), axis=1)
+    return np.asarray(missing < SHADOW * around)
 
 
 def _even(samples: Samples) -> NDArray[np.bool_]:

@@ -105,6 +105,28 @@ def test_joints_that_are_slow_against_their_noise_show_long_stalls():
         restamped(stalled(whole, 25))
 
 
+def test_spurts_of_joints_that_stick_and_slip_are_no_loss():
+    """Where the least way of the steps around was that of a step, half of such motions were refused."""
+    time = INTERVAL * np.arange(6000)
+    for seed in range(40):
+        random = np.random.default_rng(seed)
+        steps = np.where(
+            random.random((2, 6000)) < 0.02, random.exponential(1e-2, (2, 6000)), random.exponential(1e-4, (2, 6000))
+        )
+        position = np.array([np.convolve(np.cumsum(row), np.ones(15) / 15, "same") for row in steps])
+        samples = Samples("a.csv", ROBOT, time, position, None, np.arange(1, 6001))
+        assert restamped(samples)[1] == []
+
+
+def test_rare_stalls_that_lose_many_samples_are_refused():
+    """Less than 1 % of the steps, each of which loses 25 samples."""
+    whole = moved(step=1e-5)
+    kept = np.arange(whole.count) % 250 >= 25
+    rows = np.arange(1, np.count_nonzero(kept) + 1)
+    with pytest.raises(RecordingError, match=r"in 0\.[0-9]+ % of the steps .* about 1[01]"):
+        restamped(Samples("a.csv", ROBOT, INTERVAL * rows, whole.position[:, kept], None, rows))
+
+
 def stalled(whole: Samples, at_once: int) -> Samples:
     """The same, as a logger writes it that waits for so many of every 50 samples and counts on."""
     kept = np.arange(whole.count) % 50 >= at_once
