@@ -15,15 +15,17 @@ if TYPE_CHECKING:
 
 # Of columns that are no channels so many are shown on a terminal; --json has them all.
 OTHERS_SHOWN = 20
-# Longer names go on in the next line, so that the other columns keep room.
+# Longer names go on in the next line, and so do names that would leave no room for a word of what they are taken for.
 LONGEST_NAME = 40
+# What a table puts between two columns, and how many there are before the last one.
+GAP, BEFORE = 2, 3
 
 
 def inspect(
     file: Annotated[
         Path,
         typer.Argument(
-            metavar="FILE", help="A recording: .parquet, .csv, .mat, .h5, .mcap, .db3, or a rosbag2 folder."
+            metavar="FILE", help="A recording: .parquet, .csv, .mat, .npz, .h5, .mcap, .db3, or a rosbag2 folder."
         ),
     ],
     urdf: Annotated[
@@ -99,11 +101,7 @@ def _show(console: PlainConsole, found: Inspection, written: Path | None) -> Non
     from scara_ident.manners import several
 
     rows = table(str(found.path), "column", "samples", "range", "taken for", right=("samples",))
-    # Only the last column folds, so that names can be copied into robot.yaml.
-    whole = max((len(column.name) for column in found.columns), default=0) <= LONGEST_NAME
-    for place, keep in enumerate((whole, True, True)):
-        rows.columns[place].no_wrap = keep
-    others = 0
+    lines, others = [], 0
     for column in found.columns:
         others += not column.channel
         if not column.channel and others > OTHERS_SHOWN:
@@ -111,7 +109,15 @@ def _show(console: PlainConsole, found: Inspection, written: Path | None) -> Non
         span = "" if column.low is None or column.high is None else f"{column.low:.4g} .. {column.high:.4g}"
         samples = f"{column.samples}" + (f" (-{column.missing})" if column.missing else "")
         said = [_meaning(column)] + ([] if column.kind == "numbers" else [column.kind])
-        rows.add_row(column.name, samples, span, "; ".join(filter(None, said)))
+        lines.append((column.name, samples, span, "; ".join(filter(None, said))))
+    # Only the last column folds, so that names can be copied into robot.yaml.
+    longest = [max(map(len, texts), default=0) for texts in zip(*lines, strict=True)] or [0] * (BEFORE + 1)
+    word = max((len(each) for line in lines for each in line[BEFORE].split()), default=0)
+    whole = longest[0] <= LONGEST_NAME and word <= console.width - sum(longest[:BEFORE]) - BEFORE * GAP
+    for place, keep in enumerate((whole, True, True)):
+        rows.columns[place].no_wrap = keep
+    for line in lines:
+        rows.add_row(*line)
     console.print(rows)
     if others > OTHERS_SHOWN:
         console.print(f"... and {others - OTHERS_SHOWN} other columns; --json lists them")

@@ -19,7 +19,7 @@ Recordings = Annotated[
     list[str],
     typer.Argument(
         metavar="RECORDING...",
-        help="Recordings (.parquet, .csv, .mat, .h5, .mcap, .db3, a rosbag2 folder), folders or globs of them.",
+        help="Recordings (.parquet, .csv, .mat, .npz, .h5, .mcap, .db3, a rosbag2 folder), folders or globs of them.",
     ),
 ]
 Result = Annotated[Path, typer.Argument(metavar="RESULT", help="identification.json or diagnosis.json of this arm.")]

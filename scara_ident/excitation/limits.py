@@ -155,22 +155,13 @@ def limits_of(
             if not limit > 0.0:
                 raise UsageError(f"{kind} limit of {robot.joints[joint]}: {limit:g} allows no motion; give more than 0")
             wanted[joint] = limit
+    _check_stated(robot, lower, upper, velocity)
     for joint, name in enumerate(robot.joints):
         unit = robot.position_unit(joint)
-        if not (np.isfinite(lower[joint]) and np.isfinite(upper[joint])):
-            raise RobotError(
-                f"{robot.urdf}: joint {name!r} has no position limits; give <limit lower= upper=> in the URDF, or a "
-                f"range for {name} in {unit} (--range {name}=LOWER..UPPER)"
-            )
         if not upper[joint] - lower[joint] > LEAST_RANGE[unit]:
             raise RobotError(
                 f"{robot.urdf}: joint {name!r} cannot move: its range is {lower[joint]:g}..{upper[joint]:g} {unit}; "
                 "correct the URDF, give a wider range, or lock the joint"
-            )
-        if not np.isfinite(velocity[joint]):
-            raise RobotError(
-                f"{robot.urdf}: joint {name!r} has no velocity limit; give <limit velocity=> in the URDF, or a "
-                f"velocity for {name} in {unit}/s (--velocity {name}=V)"
             )
     if tool_acceleration is None:
         tool_acceleration = SCARA03_TOOL_ACCELERATION if robot.name == "scara03" else np.inf
@@ -195,6 +186,24 @@ def limits_of(
     if limits.watches_tool or tool is not None:
         return replace(limits, tool=tool_of(robot, tool))
     return limits
+
+
+def _check_stated(robot: Robot, lower: Array, upper: Array, velocity: Array) -> None:
+    """Refuse an arm that leaves limits open, with all that are to be given, so that no one runs into them one by one."""
+    ranges, speeds = ~(np.isfinite(lower) & np.isfinite(upper)), ~np.isfinite(velocity)
+    asked = [
+        f"joint {name!r} has no {' nor '.join(kinds)}"
+        for name, *open_ in zip(robot.joints, ranges, speeds, strict=True)
+        if (kinds := [kind for kind, lacks in zip(("position limits", "velocity limit"), open_, strict=True) if lacks])
+    ]
+    if not asked:
+        return
+    words = [f"--range {name}=LOWER..UPPER" for name, lacks in zip(robot.joints, ranges, strict=True) if lacks]
+    words += [f"--velocity {name}=V" for name, lacks in zip(robot.joints, speeds, strict=True) if lacks]
+    raise RobotError(
+        f"{robot.urdf}: {', '.join(asked)}; give <limit lower= upper= velocity=> in the URDF, which hold for a joint of type "
+        f"revolute or prismatic and are more than 0, or {' '.join(words)}, in rad or m"
+    )
 
 
 def _of_joints(robot: Robot, given: Mapping[str, Value] | None, kind: str) -> list[tuple[int, Value]]:

@@ -13,8 +13,16 @@ from scara_ident.arrays import Array
 from scara_ident.inspection.chain import is_still, with_locked
 from scara_ident.inspection.names import CURRENT, LINK_SIDE, TORQUE, Meaning, nameless
 from scara_ident.inspection.second_encoder import second_encoder
-from scara_ident.inspection.signals import Signal, groups, of_group
-from scara_ident.inspection.values import Reading, averages, position_readings, slopes, time_unit, velocity_reading
+from scara_ident.inspection.signals import Signal, groups, of_group, short_together
+from scara_ident.inspection.values import (
+    Reading,
+    averages,
+    one_multiple,
+    position_readings,
+    slopes,
+    time_unit,
+    velocity_reading,
+)
 from scara_ident.recording.one_clock import on_one_clock
 from scara_ident.robot.robot import Robot
 from scara_ident.robot.units import COUNT, DRIVE, TIME, Unit, find_unit, table_of
@@ -87,6 +95,7 @@ def guess(
         if signal is not None:
             result.signals[quantity] = signal
             beside = beside or signal.template
+    result.notes = short_together(result.notes)
     position, effort = result.signals.get("position"), result.signals.get("effort")
     if position is None:
         listed = (
@@ -128,10 +137,10 @@ def _find_time(result: Guess, meanings: Mapping[str, Meaning], numbers: Mapping[
     named.sort(key=lambda name: CLOCKS.index(name.lower()) if name.lower() in CLOCKS else len(CLOCKS))
     others = [name for name, said in meanings.items() if said.quantity is None and name in numbers]
     for name in (*named, *others):
-        seen = time_unit(numbers[name])
+        said = meanings[name].unit
+        seen = time_unit(numbers[name], said)
         if seen is None or (name in others and np.any(np.diff(numbers[name]) <= 0)):
             continue
-        said = meanings[name].unit
         result.time, result.time_unit = name, seen
         if said is not None and said != seen:
             result.notes.append(f"{name!r} says {said}, and its steps look like {seen}: {seen} taken")
@@ -278,7 +287,11 @@ def _find_velocity_unit(
         if not group:
             continue
         recorded = averages(time, np.array([numbers[velocity.columns[k]][good] for k in group]))
-        reading = velocity_reading(np.array([slope[k] for k in group]), recorded, robot.reduction[group], linear=linear)
+        known = np.array([slope[k] for k in group])
+        reading = velocity_reading(known, recorded, robot.reduction[group], linear=linear)
+        if reading is None and one_multiple(known, recorded):
+            # The audit says the factor, here and wherever the recording is read.
+            reading = Reading(_si(robot, "velocity", group[0]))
         if reading is None:
             result.notes.append("velocity: no slope of the positions in any unit; left out")
             del result.signals["velocity"]

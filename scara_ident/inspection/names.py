@@ -16,9 +16,9 @@ from scara_ident.robot.units import ALSO, find_unit, is_unit, table_of
 
 QUANTITIES = {
     "position": "position positions pos q jpos qpos angle angles ang theta encoder enc winkel drehwinkel lage",
-    "velocity": "velocity velocities vel qd dq qdot qvel speed speeds spd omega geschwindigkeit winkelgeschwindigkeit drehzahl "
+    "velocity": "velocity velocities vel qd dq qdot qvel dtheta thetadot speed speeds spd omega geschwindigkeit winkelgeschwindigkeit drehzahl "
     "vitesse vitesses",
-    "acceleration": "acceleration accelerations acc accel qdd ddq qddot beschleunigung winkelbeschleunigung",
+    "acceleration": "acceleration accelerations acc accel qdd ddq qddot ddtheta thetaddot beschleunigung winkelbeschleunigung",
     "effort": "effort efforts torque torques trq tau current currents curr cur amp amps moment moments force forces drehmoment kraft "
     "strom couple couples courant courants",
     "temperature": "temperature temperatures temp temps temperatur",
@@ -28,6 +28,13 @@ QUANTITIES = {
 
 # The French word for time is also the plural of a short temperature; of the arm, not of a joint, it is the time.
 _BOTH = "temps"
+# Written behind a position, as in qDot, q_dot and theta_ddot: its slope, and the slope of that.
+_SLOPES = {
+    ("dot",): "velocity",
+    ("ddot",): "acceleration",
+    ("d", "dot"): "acceleration",
+    ("dot", "dot"): "acceleration",
+}
 # What German and short names put before such words: is and shall, and whose.
 _PREFIXES = ("ist", "soll", "akt", "act", "gelenk", "achsen", "achs", "motor")
 _WORDS = {word: quantity for quantity, words in QUANTITIES.items() for word in words.split()} | {_BOTH: "temperature"}
@@ -196,9 +203,18 @@ def _parts(word: str) -> list[str]:
     return [word]
 
 
+def _with_slopes(words: list[str]) -> list[str]:
+    """Return words in which a position and the dots behind it are the quantity that they spell."""
+    for k, word in enumerate(words):
+        for dots, quantity in reversed(_SLOPES.items()):
+            if _WORDS.get(word) == "position" and tuple(words[k + 1 : k + 1 + len(dots)]) == dots:
+                return [*words[:k], quantity, *_with_slopes(words[k + 1 + len(dots) :])]
+    return words
+
+
 def _spoken(words: Sequence[str]) -> list[str]:
     """Return the words of a name, without what is no quantity beside the next or the last one."""
-    parts = [part for word in words for part in _parts(word)]
+    parts = _with_slopes([part for word in words for part in _parts(word)])
     beside = zip(["", *parts], parts, [*parts[1:], ""], strict=False)
     return [
         word

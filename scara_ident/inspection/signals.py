@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from scara_ident.inspection.chain import numbered_joints
 from scara_ident.inspection.names import Meaning, meaning
+from scara_ident.manners import several
 from scara_ident.robot.robot import Robot
+
+# What a note says between a signal and the number of its channels, by which such notes are told, and of several.
+SHORT, EACH = " has ", " each have "
 
 
 @dataclass(frozen=True)
@@ -81,6 +85,19 @@ def _over_units(found: Mapping[str, dict[int, str]], stems: Mapping[str, str]) -
     return result
 
 
+def short_together(notes: Sequence[str]) -> list[str]:
+    """Return notes in which those on signals with too few channels, or with others than the arm's, are one for each number."""
+    found: dict[str, list[str]] = {}
+    for note in notes:
+        signal, has, said = note.partition(SHORT)
+        found.setdefault(has + said, []).append(signal)
+    others = found.pop("", [])
+    return others + [
+        signals[0] + said if len(signals) == 1 else ", ".join(signals) + said.replace(SHORT, EACH, 1)
+        for said, signals in found.items()
+    ]
+
+
 def of_group(
     quantity: str, template: str, by_name: bool, members: Mapping[int, str], robot: Robot
 ) -> tuple[Signal | None, str]:
@@ -92,11 +109,10 @@ def of_group(
     pattern = pattern_of(template, first)
     joints = None if numbered != list(range(first, first + len(numbered))) else numbered_joints(robot, len(numbered))
     if joints is None:
-        said = (
-            f"{quantity}: {pattern} has {len(numbered)} channels for {robot.n} joints: not used without a mapping; name "
-            "the joints that it has, in --joints"
+        return None, (
+            f"{quantity} {pattern}{SHORT}{several(len(numbered), 'channel')} for {robot.n} joints: not used without a mapping; "
+            "name the joints that are in the file, in --joints"
         )
-        return None, said
     note = ""
     if len(numbered) > robot.n:
         note = f"{quantity}: {pattern} has {len(numbered)} channels; the first {robot.n} taken, in the joints' order"

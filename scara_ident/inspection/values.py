@@ -13,6 +13,8 @@ from scara_ident.recording.audit.position import COUNTS, FAST, HIGH, LOW, SPEED_
 from scara_ident.robot.robot import Robot
 from scara_ident.robot.units import COUNT, TIME, TURN, table_of
 
+# A log of some samples a second is more usual than one of as many thousands: steps of 0.08 are s, not ms.
+SELDOM = 2e-4
 # Positions may lie beyond the limits by this share of the range, and move this many times faster than the limit.
 SLACK, HASTE = 0.1, 2.0
 # A joint of which nothing is known turns less than this either way, and not faster.
@@ -20,6 +22,10 @@ WIDEST, FASTEST_JOINT = 2 * TURN, 4 * TURN
 LONGEST, FASTEST_SLIDE = 10.0, 10.0
 # A recorded velocity is that of the position where it correlates so well with its slope, and fits within this share.
 ALIKE, NEAR = 0.9, 0.1
+# Of a clock that runs at another rate it is another multiple of the slope, alike on all joints within this share.
+SAME = 0.05
+# Of a joint this much slower than the fastest one slope and velocity are noise: of its encoder, while it stands still.
+SLOWER = 0.02
 
 
 @dataclass(frozen=True)
@@ -30,14 +36,24 @@ class Reading:
     side: str = "joint"
 
 
-def time_unit(time: Array) -> str | None:
-    """Return the unit of a clock from its usual step; None where it is no clock."""
+def time_unit(time: Array, said: str | None = None) -> str | None:
+    """Return the unit of a clock from its usual step; None where it is no clock.
+
+    Parameters
+    ----------
+    time : ndarray, shape (N,)
+    said : str, optional
+        The unit that its name says, which holds where its steps can be such.
+    """
     step = np.diff(time[np.isfinite(time)])
     if len(step) < 2 or not np.mean(step > 0) > 0.5 or np.mean(step < 0) > 0.01:
         return None
     median = float(np.median(step[step > 0]))
     fitting = {name: unit.factor * median for name, unit in TIME.items() if FASTEST <= unit.factor * median <= SLOWEST}
-    return min(fitting, key=lambda name: abs(np.log(fitting[name] / USUAL_INTERVAL))) if fitting else None
+    if said in fitting:
+        return said
+    likely = {name: interval for name, interval in fitting.items() if interval > SELDOM} or fitting
+    return min(likely, key=lambda name: abs(np.log(likely[name] / USUAL_INTERVAL))) if likely else None
 
 
 def position_readings(robot: Robot, joints: list[int], time: Array, position: Array) -> list[Reading]:
@@ -78,7 +94,33 @@ def velocity_reading(slope: Array, velocity: Array, reduction: Array, *, linear:
     linear : bool
         Whether the joints translate.
     """
-    moving = np.std(slope, axis=1) > 0
+    ratios = _ratios(slope, velocity)
+    if ratios is None:
+        return None
+    moving = _moving(slope)
+    for side in ("joint", "motor"):
+        gear = reduction[moving] if side == "motor" else np.ones(len(ratios))
+        for name, unit in table_of("velocity", linear=linear and side == "joint").items():
+            if not name.startswith(COUNT) and np.all(np.abs(ratios * unit.factor / gear - 1) < NEAR):
+                return Reading(name, side)
+    return None
+
+
+def one_multiple(slope: Array, velocity: Array) -> bool:
+    """Tell whether recorded velocities are one multiple of the slopes of the positions, as of a clock at another rate.
+
+    Parameters
+    ----------
+    slope, velocity : ndarray, shape (k, M)
+        As of `velocity_reading`.
+    """
+    ratios = _ratios(slope, velocity)
+    return ratios is not None and bool(np.all(np.abs(ratios / np.median(ratios) - 1.0) < SAME))
+
+
+def _ratios(slope: Array, velocity: Array) -> Array | None:
+    """Return recorded velocity per slope of every joint that moves; None where one of them is not its slope."""
+    moving = _moving(slope)
     if not moving.any() or not np.isfinite(velocity[moving]).all():
         return None
     ratios = np.empty(int(moving.sum()))
@@ -86,12 +128,12 @@ def velocity_reading(slope: Array, velocity: Array, reduction: Array, *, linear:
         if np.std(recorded) == 0 or abs(np.corrcoef(known, recorded)[0, 1]) < ALIKE:
             return None
         ratios[k] = float(known @ recorded) / float(known @ known)
-    for side in ("joint", "motor"):
-        gear = reduction[moving] if side == "motor" else np.ones(len(ratios))
-        for name, unit in table_of("velocity", linear=linear and side == "joint").items():
-            if not name.startswith(COUNT) and np.all(np.abs(ratios * unit.factor / gear - 1) < NEAR):
-                return Reading(name, side)
-    return None
+    return ratios
+
+
+def _moving(slope: Array) -> NDArray[np.bool_]:
+    speed = np.std(slope, axis=1)
+    return np.asarray(speed > SLOWER * np.max(speed, initial=0.0))
 
 
 def slopes(time: Array, values: Array) -> Array:

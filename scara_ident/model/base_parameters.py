@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scara_ident.arrays import Array
 from scara_ident.errors import RobotError
 from scara_ident.manners import Frozen
+from scara_ident.model.leading_columns import sums_of, with_heavier_leads
 from scara_ident.model.regressor.kernel import pinocchio_regressor
 from scara_ident.robot.robot import Robot
 
@@ -208,18 +209,23 @@ def find_base_parameters(robot: Robot, *, rotor_inertia: bool = True, seed: int 
         else:
             dependent.append(k)
             outside.append(share)
-            if share > EXACT_TOLERANCE:
-                weak.append((k, share))
+    leads = with_heavier_leads(columns, kept, dependent)
+    if leads != kept:
+        dependent = [k for k in order if k in {*kept, *dependent} - {*leads}]
+        kept = [k for k in order if k in leads]
+        outside = [
+            float(np.linalg.norm(columns[:, k] - columns[:, kept] @ sum_of_k) / size[k])
+            for k, sum_of_k in zip(dependent, sums_of(columns, kept, dependent).T, strict=True)
+        ]
+    weak += [(k, share) for k, share in zip(dependent, outside, strict=True) if share > EXACT_TOLERANCE]
     grouping = np.zeros((len(kept), p))
     grouping[np.arange(len(kept)), kept] = 1.0
     if dependent:
-        chosen = columns[:, kept]
-        chosen_size = size[kept]
-        sums = np.linalg.lstsq(chosen / chosen_size, columns[:, dependent] / size[dependent], rcond=None)[0]
+        in_units = sums_of(columns, kept, dependent)
         # Of a column that the sums miss by a share, what they have of it below that share is the same rounding: an xArm7's
         # right angles of few digits put a ten-millionth of a rotor into every sum. A column met exactly keeps all it has.
-        sums[np.abs(sums) < np.maximum(EXACT_TOLERANCE, outside)] = 0.0
-        in_units = sums * size[dependent] / chosen_size[:, None]
+        shares = in_units * size[kept][:, None] / size[dependent]
+        in_units[np.abs(shares) < np.maximum(EXACT_TOLERANCE, outside)] = 0.0
         grouping[:, dependent] = in_units * scale[kept][:, None] / scale[dependent]
     return BaseParameters(
         standard_names=tuple(names),

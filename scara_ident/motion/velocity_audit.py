@@ -78,20 +78,21 @@ class VelocityAudit:
         return None if fault is None else told_together([fault])
 
 
-def told_together(faults: Sequence[VelocityFault], moving: int = 1) -> str:
+def told_together(faults: Sequence[VelocityFault], moving: int = 0) -> str:
     """Return the words of the same fault on several joints or recordings, with the range of its size.
 
     Parameters
     ----------
     moving : int, optional
-        Joints that move in each recording: a factor that they all share may be that of time.
+        Joints that move in each recording, where all have the fault: a factor that they share may be that of time.
     """
     sizes = [fault.size for fault in faults]
     ends = dict.fromkeys(format(size, faults[0].form) for size in (min(sizes), max(sizes)))
     said = faults[0].words.format(" to ".join(ends))
     alike = max(sizes) - min(sizes) < GAIN_ERROR * min(sizes)
-    if faults[0].words == OTHER_UNIT and moving > 1 and alike:
-        return f"{said} on every joint: is the unit or rate of time another, or that of velocity?"
+    if faults[0].words == OTHER_UNIT and moving and alike:
+        where = " on every joint" if moving > 1 else ""
+        return f"{said}{where}: is the unit or rate of time another, or that of velocity?"
     return said
 
 
@@ -120,7 +121,7 @@ def velocity_remarks(audited: Sequence[tuple[str, float, Sequence[VelocityAudit]
     return [
         (
             names,
-            f"recorded velocity of {', '.join(joints)} is not used: {told_together(sizes, len(joints) if every else 1)}",
+            f"recorded velocity of {', '.join(joints)} is not used: {told_together(sizes, len(joints) if every else 0)}",
         )
         for (joints, _, every), (names, sizes) in found.items()
     ]

@@ -65,6 +65,25 @@ def test_json_on_stdout_is_all_there_is(log, capsys):
     assert {column["name"]: column["unit"] for column in content["columns"]}["/joint_states/joint2/position"] == "rad"
 
 
+def test_long_names_leave_room_for_what_they_are_taken_for(tmp_path, capsys):
+    """Beside names of 34 letters it was written in a column of five, and a log of 36 columns took 400 lines."""
+    names = {"joint1": "ArmLsixthoutput_Joint", "joint2": "ArmLseventh_Joint"}
+    urdf = tmp_path / "arm.urdf"
+    text, made = embedded_urdf().read_text(), {"time": MADE["time"]}
+    for joint, name in names.items():
+        text = text.replace(f'"{joint}"', f'"{name}"')
+        for quantity, column in (("position", "q"), ("effort", "tau_measured")):
+            made[f"{column}_{name}"] = 1e-4 * np.asarray(MADE[f"{joint}.{quantity}"])
+    urdf.write_text(text)
+    status, out, _ = answer(capsys, save(tmp_path / "log.csv", made), "--urdf", urdf)
+    assert status == 0
+    listed = out.split("note:")[0].splitlines()
+    assert all(len(line) <= 80 for line in listed)
+    # No word is broken but a name's.
+    assert all(f"{name}," in " ".join(listed) for name in names.values())
+    assert len(listed) < 4 * len(made)
+
+
 @pytest.mark.parametrize(
     ("words", "status", "said"),
     [

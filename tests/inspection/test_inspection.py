@@ -55,6 +55,22 @@ def test_a_clock_that_the_velocities_contradict_is_asked_about(tmp_path, slow: f
     assert len(asked) == (slow != 1.0)
 
 
+@pytest.mark.parametrize(("factors", "asked"), [((1.0, 1.0), False), ((0.68, 0.68), True), ((0.68, 0.4), False)])
+def test_a_first_description_keeps_velocities_that_are_one_multiple_of_the_slopes(
+    tmp_path, factors: tuple[float, float], asked: bool
+):
+    """Of a log of 2.9 ms written at 2 ms the velocity was left out as no slope, and nothing asked for the clock."""
+    made = {f"arm {name}": values for name, values in MADE.items() if not name.endswith("velocity")}
+    for joint, factor in zip(("joint1", "joint2"), factors, strict=True):
+        made[f"arm {joint}.velocity"] = factor * np.asarray(MADE[f"{joint}.velocity"])
+    found = inspected(save(tmp_path / "a.parquet", made), tmp_path)
+    assert ("velocity" in found.mapping) is (factors[0] == factors[1])
+    assert any("is the unit or rate of time another" in note for note in found.notes) is asked
+    assert any("no slope of the positions in any unit; left out" in note for note in found.notes) is (
+        factors[0] != factors[1]
+    )
+
+
 def test_wrong_words_are_bad_usage_and_wrong_files_an_error(tmp_path):
     path = save(tmp_path / "a.parquet", MADE)
     with pytest.raises(UsageError, match="give one"):

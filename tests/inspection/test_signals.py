@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from scara_ident.inspection.names import meaning
-from scara_ident.inspection.signals import groups, of_group
+from scara_ident.inspection.signals import groups, of_group, short_together
 from scara_ident.robot.robot import load_robot
 
 ROBOT = load_robot()
@@ -26,7 +26,20 @@ def test_named_columns_are_told_by_number_too_and_unnamed_ones_by_number_only():
 def test_a_group_with_fewer_channels_than_joints_is_no_signal():
     signal, note = of_group("position", "enc[{number}]", False, {0: "enc[0]"}, ROBOT)
     assert signal is None
-    assert "1 channels for 2 joints" in note
+    assert "1 channel for 2 joints" in note
+
+
+def test_what_has_as_few_channels_is_said_once():
+    """A log of one joint of a UR5e had six notes that differed in a name, each in robot.yaml too."""
+    short = [of_group(q, f"{q}{{number}}", False, {0: q}, ROBOT)[1] for q in ("position", "effort")]
+    three = of_group("velocity", "w{number}", False, {k: f"w{k}" for k in range(3)}, load_robot("panda"))[1]
+    other = "velocity: constant for joint1; check its columns"
+    first, second, third = short_together([short[0], other, three, short[1]])
+    assert first == other
+    assert second.startswith(
+        "position position{index}, effort effort{index} each have 1 channel for 2 joints: not used"
+    )
+    assert third == three
 
 
 def test_columns_that_differ_in_their_units_alone_are_one_signal():

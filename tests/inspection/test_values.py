@@ -14,6 +14,29 @@ def test_a_clocks_unit_is_told_by_its_steps(unit, factor):
     assert time_unit(factor * MADE["time"] + 5 * factor) == unit
 
 
+@pytest.mark.parametrize(
+    ("rate", "unit", "factor"), [(12.0, "s", 1.0), (6.0, "s", 1.0), (12.0, "ms", 1e3), (3000.0, "s", 1.0)]
+)
+def test_a_slow_log_is_not_taken_for_one_a_thousand_times_as_fast(rate: float, unit: str, factor: float):
+    """Of 270 s at 12 samples a second a first description was written for 0.27 s at 12 kHz."""
+    assert time_unit(factor * np.arange(200) / rate) == unit
+
+
+def test_the_unit_that_a_clocks_name_says_holds_where_its_steps_can_be_such():
+    time = 0.125 * np.arange(200.0)
+    assert (time_unit(time), time_unit(time, "ms"), time_unit(time, "s")) == ("s", "ms", "s")
+    # Steps of 0.125 ns are none of a recording.
+    assert time_unit(time, "ns") == "s"
+
+
+def test_a_joint_that_stands_still_says_nothing_of_the_velocities_unit():
+    """The encoder of one that was held flickered by a bit, and the velocities of all were left out as no slopes."""
+    random = np.random.default_rng(0)
+    slope = np.array([np.sin(np.arange(400) / 20.0), 1e-3 * random.standard_normal(400)])
+    velocity = np.array([slope[0], 1e-2 * random.standard_normal(400)])
+    assert velocity_reading(slope, velocity, np.ones(2), linear=False) == Reading("rad/s")
+
+
 def test_what_does_not_grow_is_no_clock():
     assert time_unit(np.zeros(100)) is None
     assert time_unit(np.sin(np.arange(100.0))) is None

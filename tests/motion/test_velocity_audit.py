@@ -101,6 +101,15 @@ def test_a_factor_that_all_joints_share_may_be_that_of_time(
     assert remark.endswith("on every joint: is the unit or rate of time another, or that of velocity?") is asked
 
 
+def test_where_one_joint_moves_its_factor_may_be_that_of_time(truthful: Recording):
+    assert truthful.velocity is not None
+    found = audits(replace(truthful, velocity=3.0 * truthful.velocity))[:1]
+    ((_, remark),) = velocity_remarks([("a", RATE, found)])
+    assert remark.endswith(
+        "times the derivative of the position: is the unit or rate of time another, or that of velocity?"
+    )
+
+
 def test_an_unrelated_signal_is_found(truthful: Recording):
     assert truthful.velocity is not None
     mixed = truthful.velocity.copy()

@@ -16,13 +16,16 @@ SIDE = 3
 MOVING = 0.2
 # Fewer such samples do not tell how large its jumps are without a loss; nor fewer judged steps how often there is one.
 ENOUGH = 200
-# A step is judged where the samples missing in it are known to this many (std), ...
-KNOWN = 0.1
-# ... and one is missing from here on: between none and one, nearer to one by two of these.
-ONE = 0.7
-# A source that was late jumps back as often as ahead; lost samples ahead alone.
+# A step is judged where the samples missing in it are known to so many (std), and some are missing from here on: of one,
+# nearer to one than to none by two of these; and where the arm is slow against the noise, of many by five.
+LEVELS = ((0.1, 0.7), (0.5, 3.0))
+# A source that was late jumps back as far as ahead; lost samples ahead alone.
 AHEAD = 5.0
-# Beyond this share of the steps velocities and accelerations are not those of the arm; below it, it is said ...
+# The fit two steps beside a jump has one back of 0.42 of its size.
+SHADOW = 0.6
+# So many samples that are usually lost at once are told: such a log waits for something now and then, as for a plot.
+SEVERAL = 2
+# Beyond this share of the steps, or of the samples, velocities and accelerations are not those of the arm; below it, it is said ...
 MOST = 0.01
 # ... from this share on, and from so many.
 LEAST, FEWEST = 1e-3, 3
@@ -36,35 +39,48 @@ def restamped(samples: Samples) -> Checked:
     """Refuse a recording in which many samples are lost that the clock does not show; say it of few."""
     if samples.count < ENOUGH:
         return samples, []
-    missing = _missing(samples)
-    judged = np.isfinite(missing)
-    total = int(np.count_nonzero(judged))
-    ahead = missing > ONE
-    count = int(np.count_nonzero(ahead))
-    share = count / max(total, 1)
-    if total < ENOUGH or count < max(FEWEST, LEAST * total) or count < AHEAD * np.count_nonzero(missing < -ONE):
-        return samples, []
-    first = samples.where(int(np.argmax(ahead)) + 1)
+    missing, std = _missing(samples)
+    for known, least in LEVELS:
+        found = _judged(samples, np.where(std < known, missing, np.nan), least)
+        if found is not None:
+            return samples, [found]
+    return samples, []
+
+
+def _judged(samples: Samples, missing: Array, least: float) -> Finding | None:
+    """Say what is lost where so many samples are missing in each step, shape (N - 1,), NaN where that is not known."""
+    total = int(np.count_nonzero(np.isfinite(missing)))
+    ahead, back = ((sign * missing > least) & ~_shadows(sign * missing) for sign in (1.0, -1.0))
+    # A late sample jumps back, and the next one ahead by as much.
+    count = int(np.count_nonzero(ahead)) - int(np.count_nonzero(back))
+    lost, late = float(np.sum(missing[ahead])), -float(np.sum(missing[back]))
+    share, gone = count / max(total, 1), (lost - late) / max(total, 1)
+    if total < ENOUGH or count < max(FEWEST, LEAST * total) or lost < AHEAD * late:
+        return None
+    usual = round(float(np.median(np.sort(missing[ahead])[np.count_nonzero(back) :])))
     what = (
-        f"samples are lost and the clock was made even over it: all joints jump ahead by the way of a sample or more in "
-        f"{100 * share:.2g} % of the steps in which they move, first before {first}"
+        f"samples are lost and the clock was made even over it: "
+        f"{'all joints jump' if len(samples.position) > 1 else 'the joint jumps'} ahead by the way of "
+        f"{'a sample or more' if usual < SEVERAL else f'about {usual} samples'} in {100 * share:.2g} % of the steps in motion, "
+        f"first before {samples.where(int(np.argmax(ahead)) + 1)}, and in all about {100 * gone:.2g} are missing "
+        "for every 100 recorded"
     )
-    if share > MOST:
+    if max(share, gone) > MOST:
         samples.refuse(f"{what}; record again, with the time at which each sample was taken")
-    return samples, [Finding("restamped", f"{what}: used as it is ({several(count, 'jump')})", count)]
+    return Finding("restamped", f"{what}: used as it is ({several(count, 'jump')})", count)
 
 
-def _missing(samples: Samples) -> Array:
-    """Estimate how many samples are missing in each step, shape (N - 1,); NaN where that is not known well.
+def _missing(samples: Samples) -> tuple[Array, Array]:
+    """Estimate how many samples are missing in each step, and their std, shapes (N - 1,); NaN where nothing tells it.
 
     A sample that is missing shifts what comes after by the way of one step. Of every joint the jump and the way of a step
-    come from the same fit; each joint counts by how large its way is against the jumps that it usually shows.
+    come from the same fit, and where the jump is in its middle the way has nothing of it; each joint counts by how large its way is against the jumps that it usually shows.
     """
     place = np.arange(0.5 - SIDE, SIDE)
     fit = np.linalg.pinv(np.column_stack([np.ones_like(place), place, place**2, place > 0]))
     window = sliding_window_view(samples.position, 2 * SIDE, axis=1)
     way, jump = window @ fit[1], window @ fit[3]
-    moving = np.abs(way) > MOVING * np.sqrt(np.mean(way**2, axis=1, keepdims=True))
+    moving = np.abs(way) > MOVING * np.sqrt(np.mean(_undisturbed(way) ** 2, axis=1, keepdims=True))
     weight, idle = np.zeros_like(way), samples.idle()
     for j, inside in enumerate(moving):
         # Of a joint that stands still all is rounding.
@@ -74,11 +90,28 @@ def _missing(samples: Samples) -> Array:
             floor = ROUNDING * float(np.max(np.abs(way[j])))
             weight[j, inside] = 1.0 / max(usual, floor) ** 2
     known = np.sum(weight * way**2, axis=0)
-    judged = (known > KNOWN**-2) & _even(samples)
-    missing = np.full(samples.count - 1, np.nan)
-    inner = missing[SIDE - 1 : samples.count - SIDE]
-    inner[judged] = np.sum(weight * way * jump, axis=0)[judged] / known[judged]
-    return missing
+    missing, std = np.full((2, samples.count - 1), np.nan)
+    told = (known > 0.0) & _even(samples)
+    inner = slice(SIDE - 1, samples.count - SIDE)
+    missing[inner][told] = np.sum(weight * way * jump, axis=0)[told] / known[told]
+    std[inner][told] = known[told] ** -0.5
+    return missing, std
+
+
+def _undisturbed(way: Array) -> Array:
+    """Return how far each step goes, shape (n, M), without what a jump beside its middle adds: the least way around it."""
+    around = sliding_window_view(np.pad(np.abs(way), ((0, 0), (SIDE - 1, SIDE - 1)), mode="edge"), 2 * SIDE - 1, axis=1)
+    return np.asarray(np.min(around, axis=2))
+
+
+def _shadows(missing: Array) -> NDArray[np.bool_]:
+    """Tell which steps jump ahead only as far as the fit there does that shares most of its samples with one that jumps back.
+
+    With the signs exchanged, two such steps beside three samples lost at once were as many late ones.
+    """
+    back = np.maximum(-np.nan_to_num(missing), 0.0)
+    around = np.max(sliding_window_view(np.pad(back, SIDE - 1), 2 * SIDE - 1), axis=1)
+    return np.asarray(missing < SHADOW * around)
 
 
 def _even(samples: Samples) -> NDArray[np.bool_]:

@@ -34,6 +34,7 @@ _BUILT_IN = {
     ".parquet": "scara_ident.recording.files.parquet_csv",
     ".csv": "scara_ident.recording.files.parquet_csv",
     ".mat": "scara_ident.recording.files.mat",
+    ".npz": "scara_ident.recording.files.npz",
     ".h5": "scara_ident.recording.files.hdf5",
     ".hdf5": "scara_ident.recording.files.hdf5",
     ".mcap": BAG,

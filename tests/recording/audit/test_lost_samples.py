@@ -75,3 +75,60 @@ def test_a_source_that_is_late_now_and_then_has_lost_nothing():
     position = whole.position.copy()
     position[:, 1:][:, late[1:]] = whole.position[:, :-1][:, late[1:]]
     assert restamped(Samples("a.csv", ROBOT, whole.time, position, None, whole.row))[1] == []
+
+
+@pytest.mark.parametrize("at_once", [2, 3, 4, 25])
+@pytest.mark.parametrize("step", [0.0, 1e-5])
+def test_several_samples_lost_at_once_are_refused_with_their_number(at_once: int, step: float):
+    """A logger that drew a plot every 0.1 s stood still for 45 ms; the jumps' shadows looked like samples that were late."""
+    with pytest.raises(RecordingError, match=f"by the way of about {at_once} samples") as caught:
+        restamped(stalled(moved(step=step), at_once))
+    missing = re.search(r"in all about ([0-9.]+) are missing for every 100", str(caught.value))
+    assert missing is not None
+    assert float(missing[1]) == pytest.approx(100 * at_once / (50 - at_once), rel=0.1)
+
+
+def test_stalls_are_seen_beside_a_source_that_is_late():
+    """Of the same log 3 % of the rows held the row before, and the next ones jumped ahead by two samples."""
+    whole = stalled(moved(step=0.0), 25)
+    late = np.random.default_rng(2).random(whole.count) < 0.05
+    position = whole.position.copy()
+    position[:, 1:][:, late[1:]] = whole.position[:, :-1][:, late[1:]]
+    with pytest.raises(RecordingError, match="samples are lost"):
+        restamped(Samples("a.csv", ROBOT, whole.time, position, None, whole.row))
+
+
+def test_joints_that_are_slow_against_their_noise_show_long_stalls():
+    whole = moved(step=2e-3)
+    assert restamped(whole)[1] == []
+    with pytest.raises(RecordingError, match="samples are lost"):
+        restamped(stalled(whole, 25))
+
+
+def test_spurts_of_joints_that_stick_and_slip_are_no_loss():
+    """Where the least way of the steps around was that of a step, half of such motions were refused."""
+    time = INTERVAL * np.arange(6000)
+    for seed in range(40):
+        random = np.random.default_rng(seed)
+        steps = np.where(
+            random.random((2, 6000)) < 0.02, random.exponential(1e-2, (2, 6000)), random.exponential(1e-4, (2, 6000))
+        )
+        position = np.array([np.convolve(np.cumsum(row), np.ones(15) / 15, "same") for row in steps])
+        samples = Samples("a.csv", ROBOT, time, position, None, np.arange(1, 6001))
+        assert restamped(samples)[1] == []
+
+
+def test_rare_stalls_that_lose_many_samples_are_refused():
+    """Less than 1 % of the steps, each of which loses 25 samples."""
+    whole = moved(step=1e-5)
+    kept = np.arange(whole.count) % 250 >= 25
+    rows = np.arange(1, np.count_nonzero(kept) + 1)
+    with pytest.raises(RecordingError, match=r"in 0\.[0-9]+ % of the steps .* about 1[01]"):
+        restamped(Samples("a.csv", ROBOT, INTERVAL * rows, whole.position[:, kept], None, rows))
+
+
+def stalled(whole: Samples, at_once: int) -> Samples:
+    """The same, as a logger writes it that waits for so many of every 50 samples and counts on."""
+    kept = np.arange(whole.count) % 50 >= at_once
+    rows = np.arange(1, np.count_nonzero(kept) + 1)
+    return Samples("a.csv", ROBOT, INTERVAL * rows, whole.position[:, kept], None, rows)
