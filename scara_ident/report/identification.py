@@ -212,7 +212,10 @@ def below_zero_said(estimate: Estimate, observations: Observations) -> str | Non
     if not size:
         return None
     most = max(size, key=lambda k: size[k])
-    return f"What cannot be negative is so by no more than chance: {columns[most].name} by {size[most]:.2g} standard deviations."
+    return (
+        f"Negative, as no arm's can be: {columns[most].name} by {size[most]:.2g} standard deviations; chance may make up to "
+        f"{BEYOND_CHANCE:g} of one among so many."
+    )
 
 
 def weights_said(estimate: Estimate) -> str:

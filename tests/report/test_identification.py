@@ -201,7 +201,8 @@ def test_notes_are_handed_on(result):
 
 
 @pytest.mark.parametrize(
-    ("stds", "said"), [(-1.5, "by no more than chance"), (-6.0, "by more than chance"), (1.0, None)]
+    ("stds", "said"),
+    [(-1.5, "chance may make up to 4 of one among so many"), (-6.0, "by more than chance"), (1.0, None)],
 )
 def test_what_cannot_be_negative_is_said_to_be_so_by_chance_or_not(result, stds: float, said: str | None):
     """Rotor inertias of a Panda of 6 standard deviations below zero were said to be of no real arm, and no more."""
