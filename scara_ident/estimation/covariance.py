@@ -29,6 +29,8 @@ BLOCKS_PER_PARAMETER = 2.5
 FULL_LEVERAGE = 0.99
 # Norm of a block's leverages up to which a series takes a tenth of the time of an eigenvalue problem; at most 53 terms.
 SERIES = 0.5
+# Ratio of the squares of leverages to their sum that is more than rounding.
+ROUNDED = 1.0 + 1e-6
 # Redundancy below which nothing is known of a joint's noise.
 NO_REDUNDANCY = 1e-9
 # Parts of a recording, at the most, whose scores are looked at over all times up to the whole of it: neighbouring blocks are one.
@@ -193,7 +195,7 @@ def _pooled(joints: Sequence[_Scores], root: Array, owner: NDArray[np.intp]) -> 
     total = np.sum(root**2, axis=1)
     unknown = np.zeros(root.shape[0], dtype=bool)
     unsure = np.zeros(root.shape[0])
-    powers = side_by_side(lambda joint: _powers(joint, owner), joints)
+    powers = side_by_side(lambda joint: _powers(*_within_rows(joint), owner), joints)
     for joint, (power, expected, spread) in zip(joints, powers, strict=True):
         turned = root @ joint.turn
         share = turned @ np.sum(joint.products, axis=0) @ turned.T
@@ -209,18 +211,29 @@ def _pooled(joints: Sequence[_Scores], root: Array, owner: NDArray[np.intp]) -> 
     return matrix, freedom
 
 
-def _powers(joint: _Scores, owner: NDArray[np.intp]) -> tuple[float, float, float]:
+def _within_rows(joint: _Scores) -> tuple[Array, Array]:
+    """Return scores and products in directions that rows fix no more than wholly: where some are hardly told, rounding has leverages above 1."""
+    total = np.sum(joint.products, axis=0)
+    # Of leverages up to 1 the squares are no more than they are.
+    if np.sum(total**2) <= ROUNDED * np.trace(total):
+        return joint.scores, joint.products
+    size, turn = np.linalg.eigh(total)
+    turn = turn / np.sqrt(np.maximum(size, 1.0))
+    return joint.scores @ turn, turn.T @ joint.products @ turn
+
+
+def _powers(scored: Array, leverages: Array, owner: NDArray[np.intp]) -> tuple[float, float, float]:
     """Return the power of a joint's scores over times up to whole recordings, and of white residuals of variance 1 its mean and half its variance.
 
     With Bartlett's weights K of two parts of a recording, from 1 down to none at its length, the power is ``sum K_ab s_a' s_b``. White residuals
     leave scores with the covariance ``G_ab = [a = b] H_a - H_a H_b`` by the leverages H: its mean is tr(K G), its variance 2 tr(K G K G).
     """
     power = expected = spread = 0.0
-    between = np.zeros(joint.products.shape[1:])
+    between = np.zeros(leverages.shape[1:])
     for run in np.unique(owner):
         first, stop = np.searchsorted(owner, [run, run + 1])
         bounds = np.linspace(first, stop, min(stop - first, MOST_PARTS) + 1).astype(np.intp)
-        scores, products = joint.scores[first:stop], joint.products[first:stop]
+        scores, products = scored[first:stop], leverages[first:stop]
         if stop - first > MOST_PARTS:
             scores, products = (np.add.reduceat(each, bounds[:-1] - first) for each in (scores, products))
         apart = np.arange(len(scores))

@@ -308,3 +308,19 @@ def test_what_white_residuals_show_does_not_depend_on_how_many_blocks_are_worked
     together = estimated(rows, ends=(2,))[1]
     monkeypatch.setattr(covariance, "BLOCKS_AT_ONCE", 7)
     np.testing.assert_allclose(estimated(rows, ends=(2,))[1].matrix, together.matrix, rtol=1e-12)
+
+
+def test_a_direction_that_is_hardly_told_does_not_make_all_infinitely_unsure():
+    """Rounding of its inverse makes the leverage of all rows along it larger than 1."""
+    rng = np.random.default_rng(15)
+    w = smooth_columns(rng, 1500, 8)
+    rows = joint_rows(w, w @ np.ones(8) + white(rng, 1500), 100)
+    exact = np.linalg.inv(w.T @ w)
+    value = exact @ w.T @ rows.table[-1]
+    size, turn = np.linalg.eigh(exact)
+    rounded = (turn * size * np.append(np.ones(7), 30.0)) @ turn.T
+    owner = np.zeros(15, dtype=int)
+    known, found = (block_covariance(inverse, value, [rows], owner, np.ones(1)) for inverse in (exact, rounded))
+    assert known.kind == found.kind == "pooled block"
+    assert np.all(np.isfinite(found.matrix))
+    np.testing.assert_allclose(found.freedom, known.freedom, rtol=1e-6)
