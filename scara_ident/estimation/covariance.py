@@ -3,8 +3,11 @@
 Residuals of a low-passed 1 kHz recording are not independent, so the textbook covariance promises too much. Here
 rows are taken in blocks of time, long against the memory of the filter; blocks are nearly independent whatever
 happens inside them. Their scores give the cluster-robust covariance with the bias-reduced residuals of Bell and
-McCaffrey (2002), unbiased for white residuals, and neighbouring blocks are weighted in by Bartlett's kernel (Newey
-and West 1987). All of it follows from the triangular factors of the blocks.
+McCaffrey (2002), and neighbouring blocks are weighted in by Bartlett's kernel (Newey and West 1987). With few blocks the
+shape is that of white residuals, and the size that of the scores over times as long as the recording (the same kernel with
+the bandwidth of Kiefer and Vogelsang 2002): what a model lacks follows the motion, slower than any block. Both are
+unbiased for white residuals, and as many degrees of freedom as the scores have widen them (Satterthwaite 1946), so that two
+standard deviations cover 95 %. All of it follows from the triangular factors of the blocks.
 """
 
 from __future__ import annotations
@@ -16,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
+from scara_ident.estimation.days import widening
 from scara_ident.estimation.joint_rows import JointRows, block_products
 from scara_ident.threads import side_by_side
 
@@ -25,8 +29,16 @@ BLOCKS_PER_PARAMETER = 2.5
 FULL_LEVERAGE = 0.99
 # Norm of a block's leverages up to which a series takes a tenth of the time of an eigenvalue problem; at most 53 terms.
 SERIES = 0.5
+# Ratio of the squares of leverages to their sum that is more than rounding.
+ROUNDED = 1.0 + 1e-6
 # Redundancy below which nothing is known of a joint's noise.
 NO_REDUNDANCY = 1e-9
+# Parts of a recording, at the most, whose scores are looked at over all times up to the whole of it: neighbouring blocks are one.
+MOST_PARTS = 12
+# A variance from fewer degrees of freedom than one is not widened further.
+LEAST_FREEDOM = 1.0
+# Blocks whose products with all parameters are made together: those of all of a long recording need not be held.
+BLOCKS_AT_ONCE = 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,17 +48,21 @@ class Covariance:
     Attributes
     ----------
     matrix : ndarray, shape (p, p)
+        Widened by the degrees of freedom.
     kind : {"block", "pooled block"}
         ``block``: every direction from the scatter of its own scores. ``pooled block``: few blocks, or one that
         fixes a direction alone, so the shape of white residuals with a size from the scatter of all scores
         together.
     blocks : int
         Number of blocks.
+    freedom : ndarray, shape (p,)
+        Degrees of freedom of each parameter's variance.
     """
 
     matrix: Array
     kind: str
     blocks: int
+    freedom: Array
 
 
 def block_covariance(
@@ -69,10 +85,11 @@ def block_covariance(
     """
     root = _square_root(inverse)
     scores = side_by_side(lambda rows, weight: _scores(rows, weight, root, value), joints, weights)
-    meat = _scattered(scores, owner) if len(owner) >= BLOCKS_PER_PARAMETER * root.shape[1] else None
-    if meat is None:
-        return Covariance(_pooled(scores, root), "pooled block", len(owner))
-    return Covariance(root @ meat @ root.T, "block", len(owner))
+    found = _scattered(scores, root, owner) if len(owner) >= BLOCKS_PER_PARAMETER * root.shape[1] else None
+    kind = "block" if found else "pooled block"
+    matrix, freedom = found or _pooled(scores, root, owner)
+    wider = widening(np.maximum(freedom, LEAST_FREEDOM))
+    return Covariance(matrix * np.outer(wider, wider), kind, len(owner), freedom)
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,8 +119,8 @@ def _scores(rows: JointRows, weight: float, root: Array, value: Array) -> _Score
     return _Scores(turn, products[:, :-1, -1], products[:, :-1, :-1])
 
 
-def _scattered(joints: Sequence[_Scores], owner: NDArray[np.intp]) -> Array | None:
-    """Scatter of the scores block by block; None where a block leaves no residual to judge a direction by."""
+def _scattered(joints: Sequence[_Scores], root: Array, owner: NDArray[np.intp]) -> tuple[Array, Array] | None:
+    """Covariance by the scatter of scores block by block, and its freedom; None where a block leaves no residual to judge a direction by."""
     products = np.asarray(sum(joint.turn @ joint.products @ joint.turn.T for joint in joints))
     scores = np.asarray(sum(joint.scores @ joint.turn.T for joint in joints))
     # With H = half half', half' (1 - H)^-1/2 = (1 - half' half)^-1/2 half': the smaller of two symmetric problems.
@@ -112,7 +129,35 @@ def _scattered(joints: Sequence[_Scores], owner: NDArray[np.intp]) -> Array | No
         return None
     follows = owner[1:] == owner[:-1]
     cross = reduced[1:][follows].T @ reduced[:-1][follows]
-    return np.asarray(reduced.T @ reduced + 0.5 * (cross + cross.T))
+    meat = reduced.T @ reduced + 0.5 * (cross + cross.T)
+    share, freedom = _of_white(products, root, follows)
+    return root @ meat @ root.T / np.sqrt(np.outer(share, share)), freedom
+
+
+def _of_white(products: Array, root: Array, follows: NDArray[np.bool_]) -> tuple[Array, Array]:
+    """Return of each parameter, were residuals white, the share of its variance that blocks and their neighbours show, and its freedom.
+
+    A residual that a fit takes out of one block it adds to the others: scores of neighbours are a little opposed. The freedom is that of as
+    many blocks as tell of the parameter, of equal weight.
+    """
+    variance = np.sum(root**2, axis=1)
+    opposed, squares, neighbours = (np.zeros(len(root)) for _ in range(3))
+    # Those of the block before; nothing precedes the first.
+    before, told_before = np.zeros_like(root.T), np.zeros(len(root))
+    follows = np.append(False, follows)
+    for first in range(0, len(products), BLOCKS_AT_ONCE):
+        pulls = products[first : first + BLOCKS_AT_ONCE] @ root.T
+        told = np.einsum("pr,brp->bp", root, pulls)
+        after = follows[first : first + BLOCKS_AT_ONCE].astype(float)
+        earlier = np.concatenate([before[None], pulls[:-1]])
+        opposed += np.einsum("b,brp,brp->p", after, pulls, earlier)
+        squares += np.sum(told**2, axis=0)
+        neighbours += after @ (told * np.concatenate([told_before[None], told[:-1]]))
+        before, told_before = pulls[-1], told[-1]
+    some = variance > 0.0
+    share = 1.0 - np.divide(opposed, variance, out=np.zeros(len(root)), where=some)
+    freedom = np.divide(variance**2, squares + 0.5 * neighbours, out=np.ones(len(root)), where=some)
+    return share, freedom
 
 
 def inverse_root_times(products: Array, scores: Array) -> Array | None:
@@ -144,26 +189,64 @@ def inverse_root_times(products: Array, scores: Array) -> Array | None:
     return result
 
 
-def _pooled(joints: Sequence[_Scores], root: Array) -> Array:
-    """Covariance as if residuals were white and of one size per joint, the size from all scores together.
-
-    White residuals of variance s^2 leave scores of total power s^2 sum tr(H (1 - H)) with the leverages H.
-    """
+def _pooled(joints: Sequence[_Scores], root: Array, owner: NDArray[np.intp]) -> tuple[Array, Array]:
+    """Covariance as if residuals were white and of one size per joint, the size from all scores together, and its freedom."""
     matrix = np.zeros((root.shape[0], root.shape[0]))
     total = np.sum(root**2, axis=1)
     unknown = np.zeros(root.shape[0], dtype=bool)
-    for joint in joints:
-        # tr(H (1 - H)): leverages of a part of the rows are at most 1.
-        expected = float(np.sum(np.trace(joint.products, axis1=1, axis2=2)) - np.sum(joint.products**2))
+    unsure = np.zeros(root.shape[0])
+    powers = side_by_side(lambda joint: _powers(*_within_rows(joint), owner), joints)
+    for joint, (power, expected, spread) in zip(joints, powers, strict=True):
         turned = root @ joint.turn
         share = turned @ np.sum(joint.products, axis=0) @ turned.T
         if expected > NO_REDUNDANCY:
-            matrix += float(np.sum(joint.scores**2)) / expected * share
+            part = power / expected * share
+            matrix += part
+            unsure += (np.diag(part) / expected) ** 2 * spread
         else:
             # Rows that fix the parameters without any redundancy say nothing of the noise.
             unknown |= np.diag(share) > NO_REDUNDANCY * total
+    freedom = np.divide(np.diag(matrix) ** 2, unsure, out=np.ones(len(total)), where=unsure > 0.0)
     matrix[np.diag_indices_from(matrix)] = np.where(unknown, np.inf, np.diag(matrix))
-    return matrix
+    return matrix, freedom
+
+
+def _within_rows(joint: _Scores) -> tuple[Array, Array]:
+    """Return scores and products in directions that rows fix no more than wholly: where some are hardly told, rounding has leverages above 1."""
+    total = np.sum(joint.products, axis=0)
+    # Of leverages up to 1 the squares are no more than they are.
+    if np.sum(total**2) <= ROUNDED * np.trace(total):
+        return joint.scores, joint.products
+    size, turn = np.linalg.eigh(total)
+    turn = turn / np.sqrt(np.maximum(size, 1.0))
+    return joint.scores @ turn, turn.T @ joint.products @ turn
+
+
+def _powers(scored: Array, leverages: Array, owner: NDArray[np.intp]) -> tuple[float, float, float]:
+    """Return the power of a joint's scores over times up to whole recordings, and of white residuals of variance 1 its mean and half its variance.
+
+    With Bartlett's weights K of two parts of a recording, from 1 down to none at its length, the power is ``sum K_ab s_a' s_b``. White residuals
+    leave scores with the covariance ``G_ab = [a = b] H_a - H_a H_b`` by the leverages H: its mean is tr(K G), its variance 2 tr(K G K G).
+    """
+    power = expected = spread = 0.0
+    between = np.zeros(leverages.shape[1:])
+    for run in np.unique(owner):
+        first, stop = np.searchsorted(owner, [run, run + 1])
+        bounds = np.linspace(first, stop, min(stop - first, MOST_PARTS) + 1).astype(np.intp)
+        scores, products = scored[first:stop], leverages[first:stop]
+        if stop - first > MOST_PARTS:
+            scores, products = (np.add.reduceat(each, bounds[:-1] - first) for each in (scores, products))
+        apart = np.arange(len(scores))
+        kernel = 1.0 - np.abs(apart[:, None] - apart) / len(apart)
+        flat = products.reshape(len(apart), -1)
+        near = (kernel @ flat).reshape(products.shape)
+        shared = products @ near
+        both = np.sum(shared, axis=0)
+        power += float(np.sum(scores * (kernel @ scores)))
+        expected += float(np.trace(np.sum(products, axis=0)) - np.trace(both))
+        spread += float(np.sum(kernel**2 * (flat @ flat.T)) - 2.0 * np.sum(near * shared))
+        between += both
+    return power, expected, spread + float(np.sum(between * between.T))
 
 
 def _square_root(matrix: Array) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from scara_ident.arrays import Array
 
@@ -48,8 +48,8 @@ def same_day(offsets: Array, unsure: Array, std: Array) -> NDArray[np.intp] | No
     return day if 1 < day.max() < runs else None
 
 
-def widening(freedom: float) -> float:
-    """Return by how much a standard deviation of so few degrees of freedom is widened, so that two of it cover 95 %."""
+def widening(freedom: ArrayLike) -> Array:
+    """Return by how much standard deviations of so few degrees of freedom are widened, so that two of them cover 95 %."""
     from scipy.special import stdtrit
 
-    return 0.5 * float(stdtrit(freedom, 0.975))
+    return np.asarray(0.5 * stdtrit(freedom, 0.975))

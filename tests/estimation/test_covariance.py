@@ -10,6 +10,7 @@ from scipy.signal import lfilter
 
 from scara_ident.estimation import covariance
 from scara_ident.estimation.covariance import Covariance, block_covariance
+from scara_ident.estimation.days import widening
 from scara_ident.estimation.information import merge
 from scara_ident.estimation.joint_rows import JointRows
 
@@ -48,6 +49,17 @@ def estimated(*joints: JointRows, ends: tuple[int, ...] = ()) -> tuple[np.ndarra
     return value, block_covariance(rows.inverse(), value, joints, owner, np.ones(len(joints)))
 
 
+def variance(found: Covariance) -> np.ndarray:
+    """Variance of each parameter before its degrees of freedom widen it."""
+    return np.diag(found.matrix) / widening(found.freedom) ** 2
+
+
+def of_block(joints: list[JointRows], weights: np.ndarray, block: int) -> np.ndarray:
+    """Products of the columns of all joints in one block."""
+    rows = [joint.table[:-1, joint.starts[block] : joint.starts[block + 1]] for joint in joints]
+    return np.asarray(sum(weight**2 * own @ own.T for weight, own in zip(weights, rows, strict=True)))
+
+
 def spread_and_reported(
     noise: Callable[[np.random.Generator, int], np.ndarray], count: int, length: int, draws: int = 150, p: int = 4
 ) -> tuple[np.ndarray, np.ndarray, str]:
@@ -58,7 +70,7 @@ def spread_and_reported(
         u = w @ np.arange(1.0, p + 1) + 0.1 * noise(rng, count)
         value, found = estimated(joint_rows(w, u, length))
         values.append(value)
-        stds.append(np.sqrt(np.diag(found.matrix)))
+        stds.append(np.sqrt(variance(found)))
         kind = found.kind
         assert found.blocks == count // length
     return np.std(values, axis=0, ddof=1), np.sqrt(np.mean(np.square(stds), axis=0)), kind
@@ -132,7 +144,7 @@ def test_joints_of_different_noise_are_both_honest():
         value, found = estimated(*(joint_rows(wide[j], u[j], 500) for j in (0, 1)))
         assert found.kind == "pooled block"
         values.append(value)
-        pooled.append(np.diag(found.matrix))
+        pooled.append(variance(found))
     np.testing.assert_allclose(np.sqrt(np.mean(pooled, axis=0)), np.std(values, axis=0, ddof=1), rtol=0.3)
 
 
@@ -147,7 +159,7 @@ def test_what_one_block_alone_tells_is_not_reported_as_certain():
         u = w @ np.ones(3) + 0.1 * white(rng, 6000)
         value, found = estimated(joint_rows(w, u, 150))
         values.append(value)
-        reported.append(np.diag(found.matrix))
+        reported.append(variance(found))
     np.testing.assert_allclose(np.sqrt(np.mean(reported, axis=0)), np.std(values, axis=0, ddof=1), rtol=0.3)
 
 
@@ -200,6 +212,15 @@ def test_it_is_the_sandwich_of_bias_reduced_scores_and_their_neighbours():
     expected = inverse @ (scores.T @ scores + 0.5 * (cross + cross.T)) @ inverse
     found = block_covariance(inverse, value, joints, owner, weights)
     assert found.kind == "block"
+    # Of white residuals: what neighbours show too little of, and as how many blocks of equal weight they are.
+    blocks = [inverse @ of_block(joints, weights, b) for b in range(12)]
+    told = np.array([np.diag(part @ inverse) for part in blocks])
+    opposed = sum(np.diag(blocks[b + 1] @ blocks[b] @ inverse) for b in range(11) if b != 5)
+    neighbours = sum(told[b + 1] * told[b] for b in range(11) if b != 5)
+    freedom = np.diag(inverse) ** 2 / (np.sum(told**2, axis=0) + 0.5 * neighbours)
+    np.testing.assert_allclose(found.freedom, freedom, rtol=1e-8)
+    wider = widening(freedom) / np.sqrt(1.0 - opposed / np.diag(inverse))
+    expected = expected * np.outer(wider, wider)
     np.testing.assert_allclose(found.matrix, expected, rtol=1e-8, atol=1e-10 * np.max(np.abs(expected)))
 
 
@@ -218,3 +239,88 @@ def test_weak_and_strong_leverages_are_released_alike(strengths: tuple[float, fl
 def test_a_block_that_fixes_a_direction_alone_cannot_be_released():
     products = np.array([np.diag([0.1, 0.0]), np.diag([0.995, 0.0])])
     assert covariance.inverse_root_times(products, np.ones((2, 2))) is None
+
+
+def slow(rng: np.random.Generator, count: int, memory: float) -> np.ndarray:
+    """First-order autoregression with a memory in samples, unit variance; white without one."""
+    a = np.exp(-1.0 / memory) if memory else 0.0
+    return lfilter([np.sqrt(1 - a**2)], [1.0, -a], rng.standard_normal(count + 1000))[1000:]
+
+
+@pytest.mark.parametrize(("count", "memory"), [(1500, 0), (1500, 50), (1500, 100), (3000, 0), (3000, 50)])
+def test_two_standard_deviations_cover_95_per_cent(count: int, memory: float):
+    """Of 15 or 30 blocks of 100 samples for 12 parameters, noise that remembers none, half or all of a block.
+
+    Of 1800 parameters, some four of each twelve independent, a share of 95 % is good to 0.9 %.
+    """
+    rng = np.random.default_rng(0)
+    covered = []
+    for _ in range(150):
+        w = smooth_columns(rng, count, 12)
+        rows = joint_rows(w, w @ np.ones(12) + 0.1 * slow(rng, count, memory), 100)
+        inverse = np.linalg.inv(w.T @ w)
+        value = inverse @ w.T @ rows.table[-1]
+        found = block_covariance(inverse, value, [rows], np.zeros(len(rows.counts), dtype=int), np.ones(1))
+        assert found.kind == ("pooled block" if count == 1500 else "block")
+        covered.append(np.abs(value - 1.0) < 2.0 * np.sqrt(np.diag(found.matrix)))
+    np.testing.assert_allclose(np.mean(covered), 0.95, atol=0.015)
+
+
+def test_the_size_of_few_blocks_is_that_of_times_as_long_as_the_recording():
+    """Dense, by the covariance of all scores of white residuals, of two recordings of different length."""
+    rng = np.random.default_rng(12)
+    w = smooth_columns(rng, 900, 5)
+    u = w @ np.ones(5) + slow(rng, 900, 100)
+    rows = joint_rows(w, u, 100)
+    _, found = estimated(rows, ends=(6,))
+    assert found.kind == "pooled block"
+    inverse, owner = np.linalg.inv(w.T @ w), np.array([0] * 6 + [1] * 3)
+    apart = np.abs(np.subtract.outer(np.arange(9), np.arange(9)))
+    kernel = np.where(owner[:, None] == owner, 1.0 - apart / np.where(owner == 0, 6, 3), 0.0)
+    residual = np.eye(900) - w @ inverse @ w.T
+    root = np.linalg.cholesky(inverse)
+    scores = np.zeros((9, 5, 900))
+    for b in range(9):
+        scores[b, :, 100 * b : 100 * b + 100] = (w[100 * b : 100 * b + 100] @ root).T
+    weight = np.einsum("ab,aim,bin->mn", kernel, scores, scores)
+    left = residual @ u
+    expected, white = np.trace(residual @ weight), residual @ weight @ residual @ weight
+    np.testing.assert_allclose(found.freedom, expected**2 / np.trace(white), rtol=1e-6)
+    np.testing.assert_allclose(variance(found), left @ weight @ left / expected * np.diag(inverse), rtol=1e-6)
+
+
+def test_neighbouring_blocks_beyond_the_parts_that_are_looked_at_count_as_one():
+    rng = np.random.default_rng(13)
+    w = smooth_columns(rng, 2400, 20)
+    u = w @ np.ones(20) + coloured(rng, 2400)
+    found = [estimated(joint_rows(w, u, length))[1] for length in (100, 200)]
+    assert [item.blocks for item in found] == [2 * covariance.MOST_PARTS, covariance.MOST_PARTS]
+    np.testing.assert_allclose(found[0].matrix, found[1].matrix, rtol=1e-9)
+
+
+@pytest.mark.parametrize("blocks", [3, 64, 65, 200])
+def test_what_white_residuals_show_does_not_depend_on_how_many_blocks_are_worked_on_together(
+    blocks: int, monkeypatch: pytest.MonkeyPatch
+):
+    rng = np.random.default_rng(14)
+    w = smooth_columns(rng, 20 * blocks, 1)
+    rows = joint_rows(w, w[:, 0] + white(rng, 20 * blocks), 20)
+    together = estimated(rows, ends=(2,))[1]
+    monkeypatch.setattr(covariance, "BLOCKS_AT_ONCE", 7)
+    np.testing.assert_allclose(estimated(rows, ends=(2,))[1].matrix, together.matrix, rtol=1e-12)
+
+
+def test_a_direction_that_is_hardly_told_does_not_make_all_infinitely_unsure():
+    """Rounding of its inverse makes the leverage of all rows along it larger than 1."""
+    rng = np.random.default_rng(15)
+    w = smooth_columns(rng, 1500, 8)
+    rows = joint_rows(w, w @ np.ones(8) + white(rng, 1500), 100)
+    exact = np.linalg.inv(w.T @ w)
+    value = exact @ w.T @ rows.table[-1]
+    size, turn = np.linalg.eigh(exact)
+    rounded = (turn * size * np.append(np.ones(7), 30.0)) @ turn.T
+    owner = np.zeros(15, dtype=int)
+    known, found = (block_covariance(inverse, value, [rows], owner, np.ones(1)) for inverse in (exact, rounded))
+    assert known.kind == found.kind == "pooled block"
+    assert np.all(np.isfinite(found.matrix))
+    np.testing.assert_allclose(found.freedom, known.freedom, rtol=1e-6)
