@@ -18,6 +18,7 @@ from scara_ident.inspection.chain import arm_of, longest_chain
 from scara_ident.inspection.guess import Guess, guess
 from scara_ident.inspection.names import Meaning, meaning, meanings_by_place, nameless
 from scara_ident.inspection.text import description_text, mapping
+from scara_ident.manners import listed
 from scara_ident.motion.motion import stretches
 from scara_ident.motion.velocity_audit import audit_velocity, velocity_remarks
 from scara_ident.recording.files import column_names, is_bag_folder, read_columns
@@ -26,6 +27,9 @@ from scara_ident.robot.description import check_description
 from scara_ident.robot.examples import is_name, urdf_of
 from scara_ident.robot.robot import Robot, build_robot, load_robot
 from scara_ident.robot.signal_map import SIGNALS, contract_channels
+
+# Joints that a note names.
+MOST_NAMED = 6
 
 
 @dataclass(frozen=True)
@@ -172,12 +176,26 @@ def inspect_file(
         topic=topic,
         columns=_guessed_columns(names, numbers, meanings, found, every),
         mapping=described,
-        notes=(*found.notes, *_of_velocity(recording)),
+        notes=(*found.notes, *_of_velocity(recording), *_moving_alone(recording)),
         problems=tuple(found.problems),
         recording=recording,
         refusal=refusal,
         description=text,
     )
+
+
+def _moving_alone(recording: Recording | None) -> list[str]:
+    """Say how joints that move while others stand are identified alone: of the model of all little would be learnt."""
+    if recording is None:
+        return []
+    idle = {joint for finding in recording.findings for joint in finding.idle}
+    moving = [re.escape(name) for joint, name in enumerate(recording.joints) if joint not in idle]
+    if not idle or not moving:
+        return []
+    return [
+        f"where no recording moves more than {listed(moving, MOST_NAMED)}, --joints '{'|'.join(moving)}' identifies "
+        f"{'it' if len(moving) == 1 else 'them'} alone, with the other joints locked where they stand here"
+    ]
 
 
 def _by_description(path: Path, robot: Robot) -> Inspection:

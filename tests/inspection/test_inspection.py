@@ -97,3 +97,13 @@ def test_measured_files_read_by_the_first_description_as_by_the_published_one(tm
     assert back.joints == wanted.joints
     np.testing.assert_array_equal(back.position, wanted.position)
     np.testing.assert_array_equal(back.effort, wanted.effort)
+
+
+def test_a_joint_that_moves_alone_is_told_how_to_be_identified_alone(tmp_path):
+    asked = "--joints 'joint1' identifies it alone"
+    still = MADE | {"joint2.position": np.asarray(MADE["joint2.position"]) * 1e-6}
+    for made, told in ((still, True), (MADE, False)):
+        found = inspected(save(tmp_path / "a.parquet", made), tmp_path)
+        assert any(asked in note for note in found.notes) == told
+    alone = inspect_file(tmp_path / "a.parquet", urdf=embedded_urdf(), joints="joint1", folder=tmp_path)
+    assert not any("identifies it alone" in note for note in alone.notes)
