@@ -147,8 +147,12 @@ def audit_velocity(recording: Recording, part: Stretch) -> tuple[VelocityAudit, 
         return ()
     cut = COMPARE_BAND * part.rate
     found = []
+    # The slope of a position that flickers by a count is noise.
+    idle = {joint for finding in recording.findings for joint in finding.idle}
     inside = (recording.time >= part.time[0] - 1e-9) & (recording.time <= part.time[-1] + 1e-9)
     for j, joint in enumerate(recording.joints):
+        if j in idle:
+            continue
         recorded = np.interp(part.time, recording.time[inside], recording.velocity[j][inside])
         _, v, a = part.filtered(j, cut)
         smooth = differentiate(recorded, part.rate, cut)[0]

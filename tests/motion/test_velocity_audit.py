@@ -10,6 +10,7 @@ from scipy.signal import lfilter
 
 from scara_ident.motion.motion import stretches
 from scara_ident.motion.velocity_audit import VelocityAudit, audit_velocity, velocity_remarks
+from scara_ident.recording.audit.samples import Finding
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import Robot, load_robot
 from tests.arms import recording, sines
@@ -138,6 +139,15 @@ def test_a_joint_at_rest_is_not_judged(truthful: Recording):
     position, velocity = truthful.position.copy(), truthful.velocity.copy()
     position[0], velocity[0] = 0.7, 0.0
     assert [audit.joint for audit in audits(replace(truthful, position=position, velocity=velocity))] == ["joint2"]
+
+
+def test_the_flicker_of_a_joint_that_stands_still_is_no_slope(truthful: Recording):
+    """Of a joint that a servo held it was said that 100 % of its velocity is not the derivative of its position."""
+    flicker = 1e-4 * np.sign(np.random.default_rng(1).standard_normal(truthful.time.shape))
+    held = replace(truthful, position=np.array([truthful.position[0], flicker]))
+    assert [audit.joint for audit in audits(held)] == list(truthful.joints)
+    said = replace(held, findings=(Finding("idle_joint", "joint2 does not move", idle=(1,)),))
+    assert [(audit.joint, audit.verdict(RATE)) for audit in audits(said)] == [("joint1", None)]
 
 
 def test_without_a_recorded_velocity_there_is_nothing_to_say(truthful: Recording):
