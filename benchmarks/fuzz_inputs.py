@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from random import Random
+from typing import Any
 
 import numpy as np
 
@@ -33,7 +34,7 @@ TOKENS = (
 )  # fmt: skip
 NUMBERS = (np.nan, np.inf, -np.inf, 0.0, -1.0, 1e308, -1e308, 1e160, 1e29, 1e-300, 5e-324, 1e9, 360.0)
 LARGEST = 200_000_000  # bytes of a file whose lines are repeated: more than may be read, less than the machine has
-KINDS = ("robot.yaml", "scara.urdf", "run.csv", "run.parquet", "run.mat", "run73.mat", "run.h5", "run.mcap", "run.db3",
+KINDS = ("robot.yaml", "scara.urdf", "run.csv", "run.parquet", "run.mat", "run73.mat", "run.npz", "run.h5", "run.mcap", "run.db3",
          "bag", "trajectory.csv", "identification.json")  # fmt: skip
 
 
@@ -46,6 +47,7 @@ def write_seeds(folder: Path) -> None:
     write_columns(folder / "run.parquet", made)
     write_mat(folder / "run.mat", made)
     write_mat73(folder / "run73.mat", made)
+    write_npz(folder / "run.npz", made)
     write_hdf5(folder / "run.h5", made)
     for storage, suffix in (("mcap", "mcap"), ("sqlite3", "db3")):
         bag = write_bag(folder / f"bag_{suffix}", made, storage=storage)
@@ -75,16 +77,21 @@ def write_columns(path: Path, made: dict[str, object]) -> None:
     frame.write_csv(path) if path.suffix == ".csv" else frame.write_parquet(path)
 
 
+def write_npz(path: Path, made: Mapping[str, Any]) -> None:
+    """Write columns to an archive of arrays."""
+    np.savez(path, **made)
+
+
 def mutate(path: Path, seeds: Path, random: Random) -> str:
     """Write a mutation of the file of that name among the seeds; return what was done."""
     source = seeds / path.name
     if source.is_dir():
         shutil.copytree(source, path)
         path = source = random.choice(sorted(path.iterdir()))
-    table = {".csv": _table, ".parquet": _table, ".mat": _table, ".h5": _table}.get(path.suffix)
+    table = {".csv": _table, ".parquet": _table, ".mat": _table, ".npz": _table, ".h5": _table}.get(path.suffix)
     if table is not None and random.random() < 0.5:
         return table(path, random)
-    binary = path.suffix in (".parquet", ".mat", ".h5", ".mcap", ".db3") or random.random() < 0.15
+    binary = path.suffix in (".parquet", ".mat", ".npz", ".h5", ".mcap", ".db3") or random.random() < 0.15
     content = source.read_bytes()
     done = []
     for _ in range(random.choice((1, 1, 1, 2, 3, 8))):
@@ -220,7 +227,7 @@ def _table(path: Path, random: Random) -> str:
             made[name] = values * random.choice((1e-3, 1e3, 57.3, 1e9, -1.0, 1e-9))
         elif what == "order":
             made[name] = values[::-1].copy()
-        elif what == "shape" and path.suffix in (".mat", ".h5"):
+        elif what == "shape" and path.suffix in (".mat", ".npz", ".h5"):
             made[name] = random.choice(
                 (values[: count // 2], values.reshape(1, -1), np.stack([values] * 3), values[:0])
             )
@@ -228,9 +235,8 @@ def _table(path: Path, random: Random) -> str:
             made[name] = np.full(count, float(values.ravel()[0]) if values.size else 0.0)
         elif what == "copy":
             made[random.choice(sorted(made))] = values
-    writer = {".mat": write_mat73 if "73" in path.name else write_mat, ".h5": write_hdf5}.get(
-        path.suffix, write_columns
-    )
+    mat = write_mat73 if "73" in path.name else write_mat
+    writer = {".mat": mat, ".npz": write_npz, ".h5": write_hdf5}.get(path.suffix, write_columns)
     try:
         writer(path, made)
     except Exception:

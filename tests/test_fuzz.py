@@ -53,7 +53,7 @@ def read(path: Path, arm: Robot) -> object:
 
 
 KINDS = (
-    "robot.yaml", "scara.urdf", "run.csv", "run.parquet", "run.mat", "run73.mat", "run.h5", "run.mcap", "run.db3", "bag",
+    "robot.yaml", "scara.urdf", "run.csv", "run.parquet", "run.mat", "run73.mat", "run.npz", "run.h5", "run.mcap", "run.db3", "bag",
     "trajectory.csv", "identification.json",
 )  # fmt: skip
 
