@@ -24,13 +24,13 @@ lint: $(STAMP)
 types: $(STAMP)
 	$(BIN)/mypy
 
-# The virtual arm's loop, once, so that two workers need not both compile it.
+# The virtual arm's loop, once, so that workers need not each compile it.
 compiled: $(STAMP)
 	$(BIN)/python -c "from scara_ident import *; arm = virtual_arm(); simulate(arm, named_motion('OJD', arm.robot), rate=250.0)"
 
-# Two workers share two cores: a second BLAS thread of each would only wait for the other's. Commands that tests run keep
-# what they compile: each would compile all modules again.
-PYTEST := PYTHONDONTWRITEBYTECODE= OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2
+# Three workers share two cores, as tests wait for browsers, servers and processes; a second BLAS thread of each would only
+# wait for the others'. Commands that tests run keep what they compile: each would compile all modules again.
+PYTEST := PYTHONDONTWRITEBYTECODE= OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 3
 
 fast: $(STAMP)
 	$(PYTEST) --dist worksteal -m "not slow"
