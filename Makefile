@@ -9,7 +9,7 @@ STAMP := $(VENV)/.installed
 demo: $(STAMP)
 	$(BIN)/scara-ident demo --output demo-output
 
-# While working: a minute and a half. Before a change lands: everything.
+# While working: one to two minutes. Before a change lands: everything.
 check: lint types fast
 
 # Types are checked beside the rest: alone they would leave a core idle for most of a minute.

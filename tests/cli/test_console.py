@@ -76,6 +76,7 @@ def test_tables_fit_80_columns(command, folder: Path, tmp_path: Path, words: lis
     assert max(len(line) for line in result.out.splitlines()) <= 80
 
 
+@pytest.mark.slow
 def test_verbose_lists_what_every_file_holds(command, folder: Path, tmp_path: Path):
     made = columns(3000)
     gap = save(tmp_path / "gap_1.parquet", {name: values[made["time"] != 1.0] for name, values in made.items()})

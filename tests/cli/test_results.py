@@ -94,6 +94,7 @@ def test_a_disk_that_fills_up_keeps_the_earlier_results(command, disk: Path, fol
     assert contents(disk) == before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "words",
     [

@@ -40,6 +40,7 @@ def test_verdicts(unexplained, effects, shown, verdict):
     assert verdict_of(SimpleNamespace(unexplained=unexplained), effects, shown) == verdict
 
 
+@pytest.mark.slow
 def test_every_witness_is_heard():
     """Noise alone; then each of those held out, and an effect there, speaks against it."""
     training = observed(virtual_runs())

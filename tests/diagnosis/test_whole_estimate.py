@@ -64,6 +64,7 @@ def test_what_is_predicted_follows_from_the_parameters_that_are_told() -> None:
             assert all(np.allclose(raw, own, atol=1e-9) for raw, own in zip(raws, columns, strict=True))
 
 
+@pytest.mark.slow
 def test_its_rows_are_fitted_best_by_its_parameters(tmp_path: Path) -> None:
     """A URDF is fitted to them, and its friction again: held columns alone would lead elsewhere."""
     found = bent()

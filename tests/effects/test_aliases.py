@@ -54,6 +54,7 @@ def test_rotors_on_links_of_any_arm_are_absorbed_by_the_inertias_of_links():
     assert set(arm["joint_zero"].joints) == {"shoulder_pan_joint", "wrist_3_joint"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("robot", "joints", "carriers"),
     [

@@ -73,6 +73,7 @@ def test_slopes_are_the_differences_of_the_torque(offset: float):
     assert np.abs(found - np.moveaxis(expected, 0, 1)).max() < 1e-5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("robot", "told"), [("ur5", [1, 2, 3, 4]), ("panda", [1, 2, 3, 4, 5]), (None, []), ("kinova", [1, 2, 3, 4])]
 )

@@ -109,6 +109,7 @@ def test_recordings_held_out_have_intervals_of_their_own(found: Diagnosis):
     assert any("m7_1: payload_change acts from 1." in note for note in found.notes)
 
 
+@pytest.mark.slow
 def test_the_result_holds_the_intervals(found: Diagnosis):
     entry = diagnosis_dict(found)
     (effect,) = entry["effects"]

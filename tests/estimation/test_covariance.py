@@ -247,6 +247,7 @@ def slow(rng: np.random.Generator, count: int, memory: float) -> np.ndarray:
     return lfilter([np.sqrt(1 - a**2)], [1.0, -a], rng.standard_normal(count + 1000))[1000:]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("count", "memory"), [(1500, 0), (1500, 50), (1500, 100), (3000, 0), (3000, 50)])
 def test_two_standard_deviations_cover_95_per_cent(count: int, memory: float):
     """Of 15 or 30 blocks of 100 samples for 12 parameters, noise that remembers none, half or all of a block.

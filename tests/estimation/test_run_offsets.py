@@ -40,6 +40,7 @@ def observed(robot: Robot, offset: float, seed: int = 0) -> Observations:
     return observe(build_model(robot, "basic"), prepare(zeroed_runs(robot, offset, seed), (8.0, 8.0)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_offsets_of_runs_are_not_taken_for_gravity_and_nothing_else_seems_to_differ(robot: Robot, seed: int):
     """By least squares with one offset parameters were 190 to 350 standard deviations off, those of runs without offsets."""

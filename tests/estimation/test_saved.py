@@ -37,6 +37,7 @@ def test_parameters_covariance_and_factor_come_back(results: Results, tmp_path: 
     assert content["physically_consistent"] is not None
 
 
+@pytest.mark.slow
 def test_an_arm_that_can_exist_comes_back_with_its_bodies(results: Results, tmp_path: Path):
     results.consistent.estimate.save(tmp_path / "estimate.json")
     found = load_estimate(tmp_path / "estimate.json", results.robot)

@@ -42,6 +42,7 @@ def drawn(count: int) -> list[np.ndarray]:
     return found
 
 
+@pytest.mark.slow
 def test_a_glance_at_motions_says_which_is_better_as_the_whole_judgement_does():
     judge = judge_of(below_the_limit())
     looked, judged = (np.array([work(x) for x in drawn(12)]) for work in (judge.glance, judge.cost))

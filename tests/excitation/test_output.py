@@ -61,6 +61,7 @@ def test_a_rate_too_low_for_the_motion_is_said(made, tmp_path):
         write_trajectory(made.trajectories[0], tmp_path / "t.txt")
 
 
+@pytest.mark.slow
 def test_ros_2_gets_points_enough_for_a_fast_motion(made):
     fast = replace(made.trajectories[0], basis=make_basis(0.25, 6))
     points = yaml.safe_load(joint_trajectory_yaml(fast))["points"]

@@ -123,6 +123,7 @@ def test_a_slow_motion_is_slow_where_the_limit_is_out_of_reach_too():
     np.testing.assert_allclose(slow.limits.velocity, [0.3 * 2.0 * np.pi * (6 / 8.0) * half, 0.03])
 
 
+@pytest.mark.slow
 def test_goals_that_exclude_each_other_are_said(asked):
     model = asked[0].scene.model
     with pytest.raises(UsageError, match="without a criterion of its own"):

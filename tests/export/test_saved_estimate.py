@@ -13,6 +13,7 @@ from scara_ident.errors import ScaraIdentError
 from tests.results import Results
 
 
+@pytest.mark.slow
 def test_a_diagnosis_gives_its_estimate_with_the_effects_found(results: Results, tmp_path: Path):
     after, path = results.diagnosis.after, tmp_path / "diagnosis.json"
     results.diagnosis.save(path)

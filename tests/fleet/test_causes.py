@@ -37,6 +37,7 @@ def test_every_cause_has_a_name_of_its_own_and_acts_somewhere(histories):
     assert len(used) == len(set(used))
 
 
+@pytest.mark.slow
 def test_what_differs_from_run_to_run_has_five_directions_on_each_joint(histories):
     history = histories[0]
     first = history.visits[0]

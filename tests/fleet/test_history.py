@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from scara_ident.estimation.information import UNDETERMINED
 from scara_ident.fleet.history import common_removed, scatter, variance_prior
@@ -35,6 +36,7 @@ def test_variances_tell_each_other_by_what_spread_they_were_drawn_with():
     assert variance_prior(np.array([1.0, np.nan, 0.0, 3.0]), own) == (0.0, 1.0)
 
 
+@pytest.mark.slow
 def test_whitening_weighs_runs_as_noise(histories):
     row = histories[0].rows[0]
     root = 0.05 * np.random.default_rng(0).standard_normal((row.runs.shape[1], 6))

@@ -18,6 +18,7 @@ def test_a_turned_axis_costs_less_than_two_signs() -> None:
     assert cost((JointReading(1, 1, 2), JointReading(-1, 1, 1))) == 2 * ZERO_COST + FACTOR_COST
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("quarters", [(0, -1, 1, 0), (0, 2, 1, 0)])
 def test_zeros_of_two_joints_are_found_together(quarters: tuple[int, ...]) -> None:
     robot = arm()

@@ -58,6 +58,7 @@ def test_no_zero_is_told_where_all_are_right_or_parameters_take_it_up() -> None:
         assert channel_faults(seen(robot, runs(robot, quarters))) == ()
 
 
+@pytest.mark.slow
 def test_no_zero_is_told_of_other_faults() -> None:
     robot = arm()
     spring = runs(robot, (0,) * 4, added=np.array([8.0, 8.0, 0.0, 0.0]))

@@ -70,6 +70,7 @@ def test_stated_forces_are_as_sure_as_they_say(observer: ContactObserver):
     assert np.median(stds) < 0.2 * 60.0
 
 
+@pytest.mark.slow
 def test_a_force_that_turns_in_the_arms_frame_is_told_in_the_bases(observer: ContactObserver):
     # The first joint turns by a quarter while it lasts; what the low-pass shows lags behind by an eighth of a radian.
     run = quiet(7)

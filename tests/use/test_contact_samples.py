@@ -68,6 +68,7 @@ def test_a_force_that_rises_and_falls_is_told_where_it_is_whole(observers):
     assert off(told(observers["quiet"], run), FORCE) < OFF["quiet"]
 
 
+@pytest.mark.slow
 def test_one_too_short_to_be_whole_is_told_still(observers):
     found = told(observers["quiet"], pushed(quiet(21), FORCE, 8.0, 8.05))
     assert found.force is not None

@@ -102,6 +102,7 @@ def test_an_effect_comes_in_from_its_detection_limit_on(nothing_missing):
     assert all(item.limit >= CRITERIA.least_gain for item in nothing_missing.evidence)
 
 
+@pytest.mark.slow
 def test_one_short_run_cannot_tell():
     first = virtual_runs()[0]
     assert first.effort is not None
@@ -144,6 +145,7 @@ def test_what_does_not_hold_on_other_recordings_is_not_shown():
     assert "6 times" in found[1].why
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("missing", "shown"), [(0.009, False), (0.005, True)])
 def test_what_surely_repeats_is_no_noise_however_small_beside_it(nothing_missing, missing, shown):
     # A delay of 12 ms that no candidate could take up left as much, beside noise that is larger.

@@ -182,6 +182,7 @@ def contradicted() -> tuple[Diagnosis, HeldOutGain]:
     return replace(result, effects=(replace(result.effects[0], held_out=gain),)), gain
 
 
+@pytest.mark.slow
 def test_one_that_is_not_there_in_what_is_held_out_is_in_doubt():
     result, gain = contradicted()
     assert gain.against()

@@ -70,6 +70,7 @@ def test_errors_are_of_all_that_was_recorded():
     assert disturbed.evidence == usual.evidence
 
 
+@pytest.mark.slow
 def test_the_base_model_is_predicted_beside_it():
     result = found(0.0)
     assert result.validation_before.model is result.before.model

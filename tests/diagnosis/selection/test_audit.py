@@ -149,6 +149,7 @@ def test_of_those_that_act_together_one_whose_size_is_not_told_falls(monkeypatch
     assert unsettled(alone, alone.step.weights) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("moved", "stands"), [(0.25, True), (0.5, False)])
 def test_an_effect_that_the_noise_of_positions_moves_by_as_much_falls(
     moved: float, stands: bool, monkeypatch: pytest.MonkeyPatch

@@ -82,6 +82,7 @@ def test_coefficients_alone_are_those_of_an_examination(place: int):
     assert_allclose(products, wanted.products, rtol=1e-9, atol=1e-12 * np.max(np.abs(wanted.products)))
 
 
+@pytest.mark.slow
 def test_the_standard_deviation_is_the_scatter_of_repeated_estimates():
     rng = np.random.default_rng(3)
     columns = slow(rng, 4)

@@ -157,6 +157,7 @@ def test_friction_that_constraints_tie_is_no_surer_than_they_are_strong():
     assert np.max(np.abs(off)) < 4.0
 
 
+@pytest.mark.slow
 def test_a_parameter_that_a_constraint_fixes_is_as_sure_as_the_constraint_is_strong():
     """Its standard deviation was 0, and what the arm really has beyond it whenever noise had pushed it to the constraint."""
     model = scara("basic")
@@ -180,6 +181,7 @@ def test_a_parameter_that_a_constraint_fixes_is_as_sure_as_the_constraint_is_str
     assert within >= 11
 
 
+@pytest.mark.slow
 def test_a_slow_stroke_predicts_fast_motion():
     model = scara()
     value = truth(model)

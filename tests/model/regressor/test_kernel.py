@@ -55,6 +55,7 @@ def assert_agrees(model: pin.Model, samples: int = 40) -> None:
     assert np.all(difference <= 1e-10 * scale)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["scara", *URDFS])
 def test_kernel_agrees_with_pinocchio_and_knows_its_structural_zeros(name: str) -> None:
     model = load(name)

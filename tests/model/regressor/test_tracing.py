@@ -100,6 +100,7 @@ STEP = st.tuples(
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=150)
 @given(steps=st.lists(STEP, min_size=1, max_size=40), picks=st.lists(st.integers(0, 10**6), min_size=1, max_size=6))
 def test_emitted_code_gives_what_plain_evaluation_gives(

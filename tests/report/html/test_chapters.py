@@ -41,6 +41,7 @@ def test_what_was_corrected_in_the_data_adds_nothing_to_the_prediction():
     assert chapter(corrected=True)[0].added is None
 
 
+@pytest.mark.slow
 def test_each_chapter_begins_with_what_the_one_before_left():
     runs = with_torque(exact_runs(3)[:4], 1, lambda motion: 0.05 * motion.q[1])
     runs = with_torque(runs, 0, lambda motion: 0.05 * motion.q[0])

@@ -41,6 +41,7 @@ def test_the_residual_before_follows_what_the_effect_adds(diagnosed):
     assert slopes["residual after"] == pytest.approx(0.0, abs=0.2)
 
 
+@pytest.mark.slow
 def test_above_the_residual_stands_the_law_of_the_effect_and_what_is_measured_of_it(diagnosed):
     """The spring of 0.05 N m/rad is a line of that slope, although the base model had bent to stand for it."""
     data = data_of(diagnosed)

@@ -30,6 +30,7 @@ def test_a_page_is_closed_html_that_loads_nothing(pages, kind):
     assert not re.search(r"https?://|url\((?!#)|@import|fetch\(|XMLHttpRequest|\bimport\(", text)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", PAGES)
 def test_every_figure_of_a_page_has_its_data_and_every_data_its_figure(pages, kind):
     found = document(pages[kind])
