@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
-from scara_ident.estimation.days import widening
 from scara_ident.estimation.joint_rows import JointRows, block_products
+from scara_ident.estimation.student_t import widening
 from scara_ident.threads import side_by_side
 
 # With fewer blocks than this many per parameter the matrix of scores is too noisy to stand for itself.

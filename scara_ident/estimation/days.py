@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 
@@ -46,10 +46,3 @@ def same_day(offsets: Array, unsure: Array, std: Array) -> NDArray[np.intp] | No
     apart = np.sum((offsets[:, first] - offsets[:, second]) ** 2 / (chance + near), axis=0)
     day = fcluster(linkage(apart, "complete"), 1.0, "distance").astype(np.intp)
     return day if 1 < day.max() < runs else None
-
-
-def widening(freedom: ArrayLike) -> Array:
-    """Return by how much standard deviations of so few degrees of freedom are widened, so that two of them cover 95 %."""
-    from scipy.special import stdtrit
-
-    return np.asarray(0.5 * stdtrit(freedom, 0.975))

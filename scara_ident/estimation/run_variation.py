@@ -20,10 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
-from scara_ident.estimation.days import same_day, widening
+from scara_ident.estimation.days import same_day
 from scara_ident.estimation.joint_rows import JointRows
 from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.shared_delays import SharedDelays
+from scara_ident.estimation.student_t import widening
 from scara_ident.model.model import TorqueModel
 from scara_ident.model.terms.friction import Friction, Offset
 from scara_ident.model.terms.term import Term

@@ -10,9 +10,9 @@ from scipy.signal import lfilter
 
 from scara_ident.estimation import covariance
 from scara_ident.estimation.covariance import Covariance, block_covariance
-from scara_ident.estimation.days import widening
 from scara_ident.estimation.information import merge
 from scara_ident.estimation.joint_rows import JointRows
+from scara_ident.estimation.student_t import widening
 
 
 def white(rng: np.random.Generator, count: int) -> np.ndarray:

@@ -17,8 +17,8 @@ from scara_ident.diagnosis.held_out.states import HeldOut, held_out_states
 from scara_ident.diagnosis.selection.search import Search
 from scara_ident.diagnosis.testing.selection_step import observed_at_every_sample
 from scara_ident.estimation.another_run import left_beside_own, of_another_run
-from scara_ident.estimation.days import widening
 from scara_ident.estimation.observations import Observations, observe
+from scara_ident.estimation.student_t import widening
 from scara_ident.identification.events import Event
 from scara_ident.identification.recording_check import held_out_events, own_uncertainty, quiet_blocks
 from scara_ident.motion.prepared import PreparedData

@@ -2,14 +2,46 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
+from scara_ident.recording.files.files import chosen, refuse_no_numbers
 
 # A matrix with more channels than this is a picture or a table of something else, not a log of joints.
 MOST_CHANNELS = 128
+
+
+def names_of(path: Path, content: Iterable[tuple[str, NDArray[Any]]], wanted: str) -> tuple[str, ...]:
+    """Name the columns of all arrays of a file.
+
+    Raises
+    ------
+    RecordingError
+        It has none; ``wanted`` says what to save instead.
+    """
+    names = [name for key, array in content for name in channels(key, array.shape)]
+    if not names:
+        refuse_no_numbers(path, wanted)
+    return tuple(names)
+
+
+def columns_of(path: Path, content: Iterable[tuple[str, NDArray[Any]]], names: Sequence[str]) -> dict[str, Array]:
+    """Take some columns of the arrays of a file, as float64.
+
+    Raises
+    ------
+    RecordingError
+        It lacks one.
+    """
+    found = {
+        name: column(array, key, name) for key, array in content for name in channels(key, array.shape) if name in names
+    }
+    return chosen(path, found, names)
 
 
 def channels(name: str, shape: tuple[int, ...]) -> list[str]:

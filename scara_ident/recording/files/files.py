@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError
 from scara_ident.files import path_fault
 
@@ -42,6 +44,20 @@ def damaged(path: Path, kind: str, error: BaseException) -> RecordingError:
 def refuse_no_numbers(path: Path, what: str) -> None:
     """Refuse a file without a column of numbers."""
     raise RecordingError(f"{path}: no column of numbers in it; {what}")
+
+
+def chosen(path: Path, found: Mapping[str, Array], names: Sequence[str]) -> dict[str, Array]:
+    """Return columns in the order asked for.
+
+    Raises
+    ------
+    RecordingError
+        One was not found.
+    """
+    for name in names:
+        if name not in found:
+            raise absent(path, name)
+    return {name: found[name] for name in names}
 
 
 def absent(path: Path, name: str) -> RecordingError:

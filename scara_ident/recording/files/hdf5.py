@@ -12,7 +12,7 @@ from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError
 from scara_ident.memory import check_memory, within_limit
 from scara_ident.recording.files import arrays
-from scara_ident.recording.files.files import absent, check_file, damaged, optional_module, refuse_no_numbers
+from scara_ident.recording.files.files import check_file, chosen, damaged, optional_module, refuse_no_numbers
 
 # MATLAB keeps what cells and objects point to in groups of this kind of name.
 HIDDEN = "#"
@@ -59,10 +59,7 @@ def read_columns(path: Path, names: Sequence[str], *, separator: str = "/") -> d
                 check_memory(path, total)
                 values = data[()] if field is None else data[field]
                 found |= {name: arrays.column(values, key, name) for name in wanted}
-    for name in names:
-        if name not in found:
-            raise absent(path, name)
-    return {name: found[name] for name in names}
+    return chosen(path, found, names)
 
 
 @contextmanager

@@ -15,7 +15,7 @@ from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError
 from scara_ident.memory import check_memory, within_limit
 from scara_ident.recording.files import arrays, hdf5
-from scara_ident.recording.files.files import absent, check_file, damaged, refuse_no_numbers
+from scara_ident.recording.files.files import check_file, damaged
 
 HDF5_VERSION = b"MATLAB 7.3"
 # A number of the largest kind.
@@ -32,10 +32,9 @@ def column_names(path: Path) -> tuple[str, ...]:
     """
     if _is_hdf5(path):
         return hdf5.column_names(path, separator=".")
-    names = [name for key, array in _arrays(path) for name in arrays.channels(key, array.shape)]
-    if not names:
-        refuse_no_numbers(path, "save arrays or structs of arrays (timeseries and tables cannot be read)")
-    return tuple(names)
+    return arrays.names_of(
+        path, _arrays(path), "save arrays or structs of arrays (timeseries and tables cannot be read)"
+    )
 
 
 def read_columns(path: Path, names: Sequence[str]) -> dict[str, Array]:
@@ -48,15 +47,7 @@ def read_columns(path: Path, names: Sequence[str]) -> dict[str, Array]:
     """
     if _is_hdf5(path):
         return hdf5.read_columns(path, names, separator=".")
-    found: dict[str, Array] = {}
-    for key, array in _arrays(path):
-        for name in arrays.channels(key, array.shape):
-            if name in names:
-                found[name] = arrays.column(array, key, name)
-    for name in names:
-        if name not in found:
-            raise absent(path, name)
-    return {name: found[name] for name in names}
+    return arrays.columns_of(path, _arrays(path), names)
 
 
 def _is_hdf5(path: Path) -> bool:

@@ -14,7 +14,7 @@ from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError
 from scara_ident.memory import check_memory, within_limit
 from scara_ident.recording.files import arrays
-from scara_ident.recording.files.files import absent, check_file, damaged, refuse_no_numbers
+from scara_ident.recording.files.files import check_file, damaged
 
 
 def column_names(path: Path) -> tuple[str, ...]:
@@ -25,10 +25,7 @@ def column_names(path: Path) -> tuple[str, ...]:
     RecordingError
         The file is missing, empty, damaged or without numbers.
     """
-    names = [name for key, array in _arrays(path) for name in arrays.channels(key, array.shape)]
-    if not names:
-        refuse_no_numbers(path, "save arrays of numbers, by np.savez")
-    return tuple(names)
+    return arrays.names_of(path, _arrays(path), "save arrays of numbers, by np.savez")
 
 
 def read_columns(path: Path, names: Sequence[str]) -> dict[str, Array]:
@@ -39,16 +36,7 @@ def read_columns(path: Path, names: Sequence[str]) -> dict[str, Array]:
     RecordingError
         The file is damaged or lacks a column.
     """
-    found = {
-        name: arrays.column(array, key, name)
-        for key, array in _arrays(path)
-        for name in arrays.channels(key, array.shape)
-        if name in names
-    }
-    for name in names:
-        if name not in found:
-            raise absent(path, name)
-    return {name: found[name] for name in names}
+    return arrays.columns_of(path, _arrays(path), names)
 
 
 def _arrays(path: Path) -> Iterator[tuple[str, NDArray[Any]]]:
