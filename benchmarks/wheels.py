@@ -1,8 +1,9 @@
 """Whether the wheel works where nothing else is: built, installed into an empty environment of each Python, and used.
 
-    python benchmarks/wheels.py [--python PATH]... [--extra NAME]... [--keep FOLDER]
+    python benchmarks/wheels.py [--python PATH]... [--extra NAME]... [--lowest] [--keep FOLDER]
 
-Without --python it takes every python3.11 to python3.14 that starts. Packages come from where pip is told to look.
+Without --python it takes every python3.11 to python3.14 that starts. Packages come from where pip is told to look. With --lowest
+uv installs the oldest version of each dependency that pyproject.toml allows: what somebody has who installed them long ago.
 """
 
 from __future__ import annotations
@@ -59,7 +60,17 @@ def run(words: list[str | Path], folder: Path) -> str:
     return done.stdout.strip()
 
 
-def check(python: str, wheel: Path, extras: list[str], folder: Path) -> None:
+def install(own: Path, wanted: str, folder: Path, *, lowest: bool) -> None:
+    """Install a wheel and what it needs, the newest or the oldest that will do."""
+    if lowest:
+        run([own, "-m", "pip", "install", "--quiet", "uv"], folder)
+        words: list[str | Path] = ["uv", "pip", "install", "--quiet", "--python", own, "--resolution", "lowest-direct"]
+        run([own, "-m", *words, wanted], folder)
+    else:
+        run([own, "-m", "pip", "install", "--quiet", wanted], folder)
+
+
+def check(python: str, wheel: Path, extras: list[str], folder: Path, *, lowest: bool) -> None:
     """Install the wheel with a Python into an environment of its own, and use it there."""
     began = time.monotonic()
     version = run([python, "-c", "import platform; print(platform.python_version())"], folder)
@@ -67,7 +78,7 @@ def check(python: str, wheel: Path, extras: list[str], folder: Path) -> None:
     run([python, "-m", "venv", place], folder)
     own = place / "bin" / "python"
     wanted = f"{wheel}[{','.join(extras)}]" if extras else str(wheel)
-    run([own, "-m", "pip", "install", "--quiet", wanted], folder)
+    install(own, wanted, folder, lowest=lowest)
     installed = time.monotonic() - began
     work = place / "work"
     work.mkdir()
@@ -89,6 +100,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--python", action="append", help="a Python to try; may be repeated")
     parser.add_argument("--extra", action="append", default=[], choices=sorted(EXTRAS), help="may be repeated")
+    parser.add_argument("--lowest", action="store_true", help="the oldest versions that pyproject.toml allows")
     parser.add_argument("--keep", type=Path, help="where the environments are made, and stay")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as temporary:
@@ -97,7 +109,7 @@ def main() -> None:
         run([sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--wheel-dir", folder, ROOT], folder)
         (wheel,) = folder.glob("scara_ident-*.whl")
         for python in given.python or interpreters():
-            check(python, wheel, given.extra, folder)
+            check(python, wheel, given.extra, folder, lowest=given.lowest)
 
 
 if __name__ == "__main__":

@@ -269,7 +269,8 @@ class Problem:
         import cvxpy as cp
 
         u = self.unknowns
-        self._w, self._auxiliary = cp.Variable(u.size, name="w"), cp.Variable(u.auxiliary, name="auxiliary")
+        # Releases of cvxpy before 1.9 know no variable of no numbers.
+        self._w, self._auxiliary = cp.Variable(u.size, name="w"), cp.Variable(max(1, u.auxiliary), name="auxiliary")
         # The triangle's entries as one vector: a parameter's value then goes into the canonical form as it is.
         self._root = cp.Parameter(u.size * (u.size + 1) // 2, name="root")
         self._centre = cp.Parameter(u.size, name="centre")
@@ -309,7 +310,7 @@ class Problem:
                 break
         else:
             raise EstimationError(_what_to_try(status, self.options))
-        # A variable of no numbers has no value in cvxpy.
+        # A variable that stands nowhere has no value in cvxpy.
         auxiliary = self._auxiliary.value if u.auxiliary else np.zeros(0)
         return Point(centre + root @ self._w.value, auxiliary, self._statement.multipliers())
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from io import BytesIO
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -156,21 +157,25 @@ def _read_csv(path: Path, names: Sequence[str]) -> pl.DataFrame:
         "skip_lines": layout.first,
         "separator": layout.separator,
         "null_values": list(MISSING),
-        "glob": False,
         "raise_if_empty": False,
-        # Numbers and what parts them are the same bytes in all others; words beside them are not wanted.
-        "encoding": layout.encoding if layout.encoding == "utf-16" else "utf8-lossy",
+        # Numbers and what parts them are the same bytes in all encodings but one; words beside them are not wanted.
+        "encoding": "utf8-lossy",
     }
 
     def schema(kind: type[pl.DataType]) -> dict[str, type[pl.DataType]]:
         return {str(k): kind if k in how["columns"] else pl.String for k in range(len(layout.names))}
 
+    def read(kind: type[pl.DataType], **more: Any) -> pl.DataFrame:
+        # No path: releases of Polars before 2.0 take no columns by place where the name holds signs of a pattern.
+        with BytesIO(path.read_text("utf-16").encode()) if layout.encoding == "utf-16" else path.open("rb") as file:
+            return pl.read_csv(file, schema=schema(kind), **how, **more)
+
     try:
-        frame = pl.read_csv(path, schema=schema(pl.Float64), decimal_comma=layout.decimal_comma, **how)
+        frame = read(pl.Float64, decimal_comma=layout.decimal_comma)
     except (pl.exceptions.ComputeError, pl.exceptions.SchemaError):
         # Something is not a number: read the words themselves, so that it can be named.
         _refuse_long_rows(path, layout)
-        frame = pl.read_csv(path, schema=schema(pl.String), **how)
+        frame = read(pl.String)
         if layout.decimal_comma:
             frame = frame.with_columns(pl.all().str.replace(",", ".", literal=True))
     return frame.select(pl.col(str(own)).alias(name) for name, own in place.items())

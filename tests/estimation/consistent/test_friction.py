@@ -24,7 +24,7 @@ def slack(cones: tuple[Cone, ...], coefficients: np.ndarray, auxiliary: int) -> 
     """Largest amount by which all cones can be fulfilled with some auxiliary unknowns."""
     import cvxpy as cp
 
-    free, margin = cp.Variable(auxiliary), cp.Variable()
+    free, margin = cp.Variable(max(1, auxiliary)), cp.Variable()
     x = cp.hstack([coefficients, free]) if auxiliary else coefficients
     constraints = [margin <= 1.0]
     for cone in cones:
