@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from scara_ident.errors import ProcessEnded, ScaraIdentError, UsageError
 from scara_ident.fleet.folder import INSTALL
 from scara_ident.processes import uninterrupted
+from scara_ident.threads import available_cores
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -155,7 +156,7 @@ def started(scheduler: str | None = None, workers: int | None = None) -> Iterato
                 with client:
                     yield Engine(client)
                 return
-            count = workers or len(os.sched_getaffinity(0))
+            count = workers or available_cores()
             with ExitStack() as stack:
                 spawned = dask.config.get("distributed.nanny.pre-spawn-environ")
                 stack.enter_context(_environment_kept((*spawned, *BESIDE)))
