@@ -343,10 +343,13 @@ def _remarks(outcome: Outcome, parameters: PhysicalParameters) -> list[str]:
     drift = clock_drift(after.value, outcome.training)
     if drift is not None:
         notes.append(drift)
-    if left is not None and robot.reduction[robot.joints.index(left.joint)] == 1.0:
+    if left is not None and robot.reduction[place := robot.joints.index(left.joint)] == 1.0:
+        of_slide = (
+            ", in motor rad per metre (of a linear motor 2 pi over its pole pitch)" if robot.prismatic[place] else ""
+        )
         notes.append(
             f"{left.joint}: no reduction is stated, and of a motor behind a gear or a screw no ripple is looked for; "
-            "state it in robot.yaml"
+            f"state it in robot.yaml{of_slide}"
         )
     elif left is not None and f"position of {left.joint}" in left.signals:
         criteria = found.step.criteria
