@@ -13,7 +13,7 @@ from scara_ident.arrays import Array
 from scara_ident.inspection.chain import is_still, with_locked
 from scara_ident.inspection.names import CURRENT, LINK_SIDE, TORQUE, Meaning, nameless
 from scara_ident.inspection.second_encoder import second_encoder
-from scara_ident.inspection.signals import Signal, groups, of_group, short_together
+from scara_ident.inspection.signals import Signal, groups, of_group, of_other_kind, short_together
 from scara_ident.inspection.values import (
     Reading,
     averages,
@@ -176,6 +176,10 @@ def _find_signal(
         moving = sum(not is_still(numbers[column]) for column in signal.columns.values())
         rank = (
             said.commanded,
+            any(
+                of_other_kind(meanings[column], quantity, bool(robot.prismatic[k]))
+                for k, column in signal.columns.items()
+            ),
             -moving,
             -len(signal.columns),
             bool(said.words & LINK_SIDE),
