@@ -84,6 +84,8 @@ BLOCKS = (CONFIRMED, ("position", "effort"))
 _NAMELESS = re.compile("column_[0-9]+")
 # Units that their capitals tell from other words.
 _CAPITALS = re.compile(r"(?:^|[_ .])(mA|A|mNm|Nm|N)(?=$|[_ .\[])")
+# Messages of ROS, whose positions are in rad and m (REP 103), as they stand in the columns of an export.
+JOINT_STATES = re.compile(r"joint_?states?\b", re.IGNORECASE)
 # What parts the levels of a path, and the fields of a structure.
 _LEVEL = re.compile("[/.]")
 # What German writes where umlauts cannot be written; accents of other languages are left out there.

@@ -133,3 +133,19 @@ def test_of_a_cart_and_its_pole_the_position_is_of_what_slides(tmp_path, kind, a
     made["force"] = MADE["joint1.effort"]
     found = inspected(save(tmp_path / "a.csv", made), tmp_path, write_urdf(tmp_path / "arm.urdf", (Link(kind),)))
     assert found.mapping["position"]["column"] == taken
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"), [("/joint_states/{joint}/{signal}", "rad"), ("/arm/{joint}/{signal}", "deg")]
+)
+def test_positions_of_joint_states_are_in_si_however_far_they_wind(tmp_path, name, unit):
+    """A motor that stood at 327 rad was read in degrees, as one without limits turns less."""
+    made = {"time": MADE["time"]}
+    for key, values in MADE.items():
+        if key != "time":
+            joint, signal = key.split(".")
+            wound = 327.0 if key == "joint1.position" else 0.0
+            made[name.format(joint=joint.replace("joint", "j"), signal=signal)] = values + wound
+    urdf = write_urdf(tmp_path / "arm.urdf", (Link("continuous"), Link("continuous")))
+    found = inspected(save(tmp_path / "a.csv", made), tmp_path, urdf)
+    assert found.mapping["position"]["unit"] == unit
