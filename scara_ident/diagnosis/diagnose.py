@@ -255,7 +255,7 @@ def diagnose(
     parameters = parameters_of_laws(whole) if whole.chosen else PhysicalParameters()
     groups = confounders(step, found.decisions, found.first, found.doubtful) if found.chosen else []
     final = told if parameters.linear is None else with_whole_estimate(told, parameters.linear)
-    rows, useless = with_rows(held_out.at(found.bands), needed=False)
+    rows, useless = with_rows(held_out.at(found.bands), found.scene.robot, needed=False)
     held = validated(final, rows)
     # What was asked beside the model stays as it was asked, and where.
     final = replace(final, search=found)
@@ -318,7 +318,7 @@ def _where_searched(outcome: Outcome, held_out: PreparedData) -> tuple[Outcome, 
     linear = physical_parameters(_whole(outcome)).linear
     assert linear is not None
     final = with_whole_estimate(outcome, linear)
-    held = validated(final, with_rows(held_out.at(outcome.search.bands), needed=False)[0])
+    held = validated(final, with_rows(held_out.at(outcome.search.bands), outcome.search.scene.robot, needed=False)[0])
     return replace(final, search=outcome.search), held
 
 
@@ -343,10 +343,13 @@ def _remarks(outcome: Outcome, parameters: PhysicalParameters) -> list[str]:
     drift = clock_drift(after.value, outcome.training)
     if drift is not None:
         notes.append(drift)
-    if left is not None and robot.reduction[robot.joints.index(left.joint)] == 1.0:
+    if left is not None and robot.reduction[place := robot.joints.index(left.joint)] == 1.0:
+        of_slide = (
+            ", in motor rad per metre (of a linear motor 2 pi over its pole pitch)" if robot.prismatic[place] else ""
+        )
         notes.append(
             f"{left.joint}: no reduction is stated, and of a motor behind a gear or a screw no ripple is looked for; "
-            "state it in robot.yaml"
+            f"state it in robot.yaml{of_slide}"
         )
     elif left is not None and f"position of {left.joint}" in left.signals:
         criteria = found.step.criteria

@@ -13,7 +13,7 @@ from scara_ident.diagnosis.fitting.effect_parameters import Coefficients, Physic
 from scara_ident.diagnosis.held_out.gain import HeldOutGain
 from scara_ident.diagnosis.selection.confounding import Confounder
 from scara_ident.diagnosis.selection.search import Search
-from scara_ident.effects import Effect, Parameter
+from scara_ident.effects import Effect, Parameter, Scene
 from scara_ident.estimation.run_offsets import rms_of
 
 
@@ -68,6 +68,15 @@ class FoundEffect:
     def title(self) -> str:
         """The effect and its joint, as a heading."""
         return self.effect if self.joint is None else f"{self.effect} on {self.joint}"
+
+    def rival_names(self, scene: Scene) -> tuple[str, ...]:
+        """Return the labels of `confounded_with`, and beside one that is its own what that member is."""
+        return tuple(
+            f"{item.label} ({item.candidate.effect.description(scene, item.candidate.member)})"
+            if item.label == self.label
+            else item.label
+            for item in self.confounded_with
+        )
 
 
 Readings = Mapping[tuple[str, str | None], Mapping[str, Parameter]]

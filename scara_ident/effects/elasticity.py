@@ -249,7 +249,7 @@ class Backlash(BehindGear):
     )  # fmt: skip
     nonlinear = (NonlinearParameter("_flown_width", "{position}", 1e-5, LARGEST_WIDTH, of_length=True),)
     view = View("reversal", along=True, distance="width")
-    experiment = "reverse under little load, and look for the angle within which no torque is needed"
+    experiment = "reverse under little load, and look for the way within which no torque is needed"
 
     def scan(self, scene: Scene, joint: int) -> Iterable[tuple[float, ...]]:
         """Return three widths, and more of a joint that slides."""

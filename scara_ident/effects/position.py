@@ -40,7 +40,7 @@ class Spring(Effect):
     of_state = True
     watched = True
     view = View("position")
-    experiment = "hold still, or creep, at positions over the whole range: a spring grows with the angle, a tilt follows its sine"
+    experiment = "hold still, or creep, at positions over the whole range: a spring grows with the way, a tilt follows the sine of the angle"
 
     def columns(self, scene: Scene, member: Member) -> tuple[Column, ...]:
         """Describe the deflection, and the constant where the model has no offset."""

@@ -48,7 +48,7 @@ class Presliding(Effect):
     nonlinear = (NonlinearParameter("presliding_distance", "{position}", 1e-5, 0.3, of_length=True, told_as=1.0),)
     in_small_ways = True
     view = View("reversal", along=True, distance="presliding_distance")
-    experiment = "reverse often with small amplitude at two speeds: its memory is in angle, a delay's is in time"
+    experiment = "reverse often with small amplitude at two speeds: its memory is in the way gone, a delay's is in time"
 
     def scan(self, scene: Scene, joint: int) -> Iterable[tuple[float, ...]]:
         """Return distances that the joint's travel holds many times."""

@@ -360,16 +360,18 @@ def _observed(
             # Made once, and not in two threads.
             _ = part.fade, part.kept
             parts.append((part, side_by_side(part.rows, range(len(tables)), tables)))
-    return tuple(raws), _recording_rows(item, parts)
+    return tuple(raws), _recording_rows(item, parts, model.robot.position_unit)
 
 
-def _recording_rows(item: PreparedRecording, parts: Sequence[tuple[PreparedStretch, list[Array]]]) -> list[JointRows]:
+def _recording_rows(
+    item: PreparedRecording, parts: Sequence[tuple[PreparedStretch, list[Array]]], unit: Callable[[int], str]
+) -> list[JointRows]:
     """Return the rows of a recording from those of its usable stretches, joint by joint."""
     if not any(len(kept) for part, _ in parts for kept in part.kept):
         samples = sum(part.samples for part in item.stretches)
         raise RecordingError(
             f"{item.recording.path or item.name}: nothing is left of {samples} samples once the ends and the times "
-            f"at rest are left out; {coarse_positions(item) or 'record longer or moving data'}"
+            f"at rest are left out; {coarse_positions(item, unit) or 'record longer or moving data'}"
         )
     found = []
     for j in range(len(item.bands)):

@@ -129,7 +129,7 @@ def pinocchio_module(
         "GRAVITY": (numbers(robot.model.gravity.linear), "m/s^2"),
         "ARMATURE": (numbers(armature), "at the joint, kg m^2 or kg"),
         "ROTOR_INERTIA": (numbers(armature / robot.reduction**2), "of the motor, kg m^2"),
-        "REDUCTION": (numbers(robot.reduction), "motor turns per joint turn"),
+        "REDUCTION": (numbers(robot.reduction), "motor turns per joint turn, motor rad per metre where it slides"),
         "SIDE": (numbers(robot.row_scale), f"recorded torque, {robot.effort_side} side, per torque at the joint"),
         "FRICTION": (numbers(alone.coulomb), "dry friction at the joint, N m or N"),
         "DAMPING": (numbers(alone.viscous), "at the joint, N m s/rad or N s/m"),

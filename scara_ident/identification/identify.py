@@ -351,10 +351,17 @@ def undetermined(identification: Identification) -> list[str]:
 
 
 def not_told_from_zero(identification: Identification) -> list[str]:
-    """Return the names of the determined parameters that are within two standard deviations of zero."""
+    """Return the names of the determined parameters that are within two standard deviations, where known, of zero."""
     estimate = identification.estimate
-    small = (np.abs(estimate.value) < 2.0 * estimate.std) & ~estimate.undetermined
+    small = (np.abs(estimate.value) < 2.0 * estimate.std) & ~estimate.undetermined & np.isfinite(estimate.std)
     return [name for name, is_small in zip(estimate.model.names, small, strict=True) if is_small]
+
+
+def of_unknown_std(identification: Identification) -> list[str]:
+    """Return the names of the determined parameters whose standard deviation the recordings do not tell."""
+    estimate = identification.estimate
+    unknown = ~np.isfinite(estimate.std) & ~estimate.undetermined
+    return [name for name, is_unknown in zip(estimate.model.names, unknown, strict=True) if is_unknown]
 
 
 def worst_validation(identification: Identification) -> tuple[str, str, JointError] | None:

@@ -21,6 +21,7 @@ from scara_ident.motion.prepared import PreparedData, PreparedRecording, prepare
 from scara_ident.motion.velocity_audit import audit_velocity, velocity_remarks
 from scara_ident.recording.recording import Recording
 from scara_ident.recording.shared_samples import copies_among
+from scara_ident.robot.robot import Robot
 from scara_ident.threads import side_by_side
 
 # A recording of which more was recorded before is a copy of that, whatever else it holds.
@@ -83,8 +84,8 @@ def usable_in_bands(
     if bands is None:
         chosen, data, useless = _bands_of(model, data, alike=alike)
         bands, notes = chosen.bands, [*notes, *chosen.notes]
-    data, short = with_rows(data.at(bands), needed=True)
-    held_out, more = with_rows(held_out.at(bands), needed=False)
+    data, short = with_rows(data.at(bands), model.robot, needed=True)
+    held_out, more = with_rows(held_out.at(bands), model.robot, needed=False)
     if validation and not held_out.recordings:
         raise RecordingError(f"{more[0]}, and nothing else is held out")
     return data, held_out, [*notes, *useless, *short, *more]
@@ -98,7 +99,7 @@ def _bands_of(model: TorqueModel, data: PreparedData, *, alike: bool) -> tuple[B
         if alike:
             # A joint whose model lacks something seems to have less band than it has.
             choice = replace(choice, bands=(max(choice.bands),) * len(choice.bands))
-        left, short = with_rows(data.at(choice.bands), needed=True)
+        left, short = with_rows(data.at(choice.bands), model.robot, needed=True)
         if not short:
             return choice, left, useless
         data, useless = left, [*useless, *short]
@@ -144,7 +145,7 @@ def usable_data(recordings: Sequence[Recording]) -> tuple[PreparedData, list[str
     return PreparedData(tuple(kept), kept[0].bands if kept else ()), notes
 
 
-def with_rows(data: PreparedData, *, needed: bool) -> tuple[PreparedData, list[str]]:
+def with_rows(data: PreparedData, robot: Robot, *, needed: bool) -> tuple[PreparedData, list[str]]:
     """Return recordings in their bands without those that have next to no rows, and say which.
 
     Parameters
@@ -159,7 +160,7 @@ def with_rows(data: PreparedData, *, needed: bool) -> tuple[PreparedData, list[s
     said = (
         (
             str(item.recording.path or item.name),
-            f"{count} independent rows are left once the ends and the times at rest are left out{_because(item)}; left out",
+            f"{count} independent rows are left once the ends and the times at rest are left out{_because(item, robot)}; left out",
         )
         for item, count in zip(data.recordings, rows, strict=True)
         if count < LEAST_ROWS
@@ -167,8 +168,8 @@ def with_rows(data: PreparedData, *, needed: bool) -> tuple[PreparedData, list[s
     return data.of(kept), _once(said)
 
 
-def _because(item: PreparedRecording) -> str:
-    coarse = coarse_positions(item)
+def _because(item: PreparedRecording, robot: Robot) -> str:
+    coarse = coarse_positions(item, robot.position_unit)
     return "" if coarse is None else f" ({coarse})"
 
 
@@ -184,10 +185,10 @@ def check_rows(observations: Observations) -> None:
     for joint in observations.joints:
         told[joint.columns[np.any(joint.table[:-1] != 0.0, axis=1)]] = True
     if rows <= np.count_nonzero(told):
-        first = observations.data.sources[0]
+        first, unit = observations.data.sources[0], observations.model.robot.position_unit
         raise RecordingError(
             f"{first.path or first.name}: {rows} independent rows within the bands for {np.count_nonzero(told)} parameters; "
-            f"{coarse_positions(observations.data.recordings[0]) or 'record longer, or give a wider band'}"
+            f"{coarse_positions(observations.data.recordings[0], unit) or 'record longer, or give a wider band'}"
         )
 
 

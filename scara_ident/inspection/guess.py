@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.inspection.chain import is_still, with_locked
-from scara_ident.inspection.names import CURRENT, LINK_SIDE, TORQUE, Meaning, nameless
+from scara_ident.inspection.names import CURRENT, JOINT_STATES, LINK_SIDE, TORQUE, Meaning, nameless
 from scara_ident.inspection.second_encoder import second_encoder
-from scara_ident.inspection.signals import Signal, groups, of_group, short_together
+from scara_ident.inspection.signals import Signal, groups, of_group, of_other_kind, short_together
 from scara_ident.inspection.values import (
     Reading,
     averages,
@@ -176,6 +176,10 @@ def _find_signal(
         moving = sum(not is_still(numbers[column]) for column in signal.columns.values())
         rank = (
             said.commanded,
+            any(
+                of_other_kind(meanings[column], quantity, bool(robot.prismatic[k]))
+                for k, column in signal.columns.items()
+            ),
             -moving,
             -len(signal.columns),
             bool(said.words & LINK_SIDE),
@@ -226,7 +230,12 @@ def _find_units(
         if not group:
             continue
         values = np.array([numbers[position.columns[k]][good] for k in group])
-        said = [_si(robot, "position", k) if stated else meanings[position.columns[k]].unit for k in group]
+        columns = [(k, position.columns[k]) for k in group]
+        # Whatever wrote them to a file, messages of this name are in SI, and wind on over many turns.
+        said = [
+            _si(robot, "position", k) if stated or JOINT_STATES.search(column) else meanings[column].unit
+            for k, column in columns
+        ]
         reading = _position_reading(result, robot, group, time, values, said)
         readings |= dict.fromkeys(group, reading)
         if reading.unit == COUNT:

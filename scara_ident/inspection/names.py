@@ -53,6 +53,8 @@ OTHER = frozenset(
 )  # fmt: skip
 # Of an encoder behind the gear, where there is another one before it.
 LINK_SIDE = frozenset(("link", "load", "output", "secondary", "second", "se", "abtrieb", "abtriebsseitig"))
+# Of what turns; a joint that slides has none of them.
+ANGLE = frozenset(("angle", "angles", "ang", "theta", "winkel", "drehwinkel"))
 GENERIC = frozenset(("joint", "link", "axis", "motor", "gelenk", "achse", "axe", "articulation", "moteur"))
 CURRENT = frozenset(("current", "currents", "curr", "cur", "amp", "amps", "i", "strom", "courant", "courants"))
 # Such a word says that a value is of now where it stands before a quantity; before a letter, as in current_t, it is one.
@@ -82,6 +84,10 @@ BLOCKS = (CONFIRMED, ("position", "effort"))
 _NAMELESS = re.compile("column_[0-9]+")
 # Units that their capitals tell from other words.
 _CAPITALS = re.compile(r"(?:^|[_ .])(mA|A|mNm|Nm|N)(?=$|[_ .\[])")
+# Messages of ROS, whose positions are in rad and m (REP 103), as they stand in the columns of an export.
+JOINT_STATES = re.compile(r"joint_?states?\b", re.IGNORECASE)
+# What parts the levels of a path, and the fields of a structure.
+_LEVEL = re.compile("[/.]")
 # What German writes where umlauts cannot be written; accents of other languages are left out there.
 _UMLAUTS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "Ä": "AE", "Ö": "OE", "Ü": "UE"})
 
@@ -150,10 +156,10 @@ def meaning(name: str, joints: Sequence[str] = ()) -> Meaning:
         found = ["effort"]
     signals = [quantity for quantity in found if quantity != "time"]
     quantity = signals[-1] if signals else found[-1] if found else None
-    # Of a path the last name says what it is: the clock of a group of positions is no position.
-    ending = [token[0].lower() for token in _TOKEN.finditer(_without_accents(name.rpartition("/")[2]))]
-    told = {_WORDS[part] for word in ending for part in _parts(word) if part in _WORDS}
-    if "/" in name and alone and told == {"time"}:
+    # Of a path, or a structure, the last name says what it is: the clock of a group of positions is no position.
+    *above, own = _LEVEL.split(_without_accents(name))
+    told = {_WORDS[part] for token in _TOKEN.finditer(own) for part in _parts(token[0].lower()) if part in _WORDS}
+    if any(above) and told == {"time"}:
         quantity = "time"
     # A unit such as U/min is no minimum.
     outside = {token[0].lower() for token in _TOKEN.finditer(_BRACKETS.sub("", name))}

@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from scara_ident.inspection.chain import numbered_joints
-from scara_ident.inspection.names import Meaning, meaning
+from scara_ident.inspection.names import ANGLE, Meaning, meaning
 from scara_ident.manners import several
 from scara_ident.robot.robot import Robot
+from scara_ident.robot.units import table_of
 
 # What a note says between a signal and the number of its channels, by which such notes are told, and of several.
 SHORT, EACH = " has ", " each have "
@@ -46,6 +47,17 @@ class Signal:
 def pattern_of(template: str, first_number: int | None) -> str:
     """Return a template as a robot description has it."""
     return template.replace("{number}", "{index}") if first_number == 0 else template
+
+
+def of_other_kind(said: Meaning, quantity: str, slides: bool) -> bool:
+    """Tell whether a name is of a joint that turns where this one slides, or the other way round."""
+    if quantity not in ("position", "velocity"):
+        return False
+    if slides and said.words & ANGLE:
+        return True
+    return said.unit is not None and (said.unit in table_of(quantity, linear=slides)) < (
+        said.unit in table_of(quantity, linear=not slides)
+    )
 
 
 def groups(quantity: str, meanings: Mapping[str, Meaning], joints: int) -> list[tuple[str, bool, dict[int, str]]]:

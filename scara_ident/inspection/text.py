@@ -8,6 +8,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from scara_ident.inspection.guess import Guess
 from scara_ident.inspection.signals import Signal
 from scara_ident.robot.robot import Robot
@@ -41,8 +43,7 @@ def description_text(guess: Guess, robot: Robot, described: Mapping[str, Any], u
         "",
         *_side(robot),
         "",
-        "# Joints to identify, in order. reduction: motor turns per joint turn (from the URDF's transmissions, else 1);",
-        "# effort_gain: torque in N m (N) = effort_gain x recorded effort.",
+        *_joints_words(robot),
     ]
     lines += _rotor_words(guess, robot)
     lines += _joints(guess, robot)
@@ -86,12 +87,27 @@ def _side(robot: Robot) -> list[str]:
     ]
 
 
+def _joints_words(robot: Robot) -> list[str]:
+    """Say what stands at the joints, of those that slide in metres."""
+    first = (
+        "# Joints to identify, in order. reduction: motor turns per joint turn (from the URDF's transmissions, else 1);"
+    )
+    if not np.any(robot.prismatic):
+        return [first, "# effort_gain: torque in N m = effort_gain x recorded effort."]
+    return [
+        first,
+        "# of a joint that slides motor rad per metre: 2 pi over a screw's lead or a linear motor's pole pitch, 1 over the",
+        "# radius of a pinion or pulley. effort_gain: torque in N m, or force in N, = effort_gain x recorded effort.",
+    ]
+
+
 def _rotor_words(guess: Guess, robot: Robot) -> list[str]:
     if all(robot.rotor_stated[k] for k in guess.joints):
         return []
+    slides = ", kg where it slides" if any(robot.prismatic[k] for k in guess.joints) else ""
     return [
         "# STATE rotor_inertia, kg m^2 of the rotor with shaft, brake and wave generator, on the motor's side of the gear",
-        "# (with reduction 1: seen at the joint). Gear loss, elasticity and backlash depend on it. The numbers behind # are",
+        f"# (with reduction 1: seen at the joint{slides}). Gear loss, elasticity and backlash depend on it. The numbers behind # are",
         f"# orders of magnitude from the effort limits, good to a factor of {GUESS_FACTOR:g}: not stated, they are where the search begins.",
     ]
 

@@ -7,7 +7,7 @@ depends on it is the more wrong the larger it is. How wrong is seen by adding as
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from weakref import WeakKeyDictionary
 
@@ -57,13 +57,18 @@ LITTLE = 0.1
 SPEED_OVER = 0.1
 
 
-def coarse_positions(item: PreparedRecording) -> str | None:
+def coarse_positions(item: PreparedRecording, unit: Callable[[int], str]) -> str | None:
     """Name the joints whose encoders are too coarse for their bands: what counts as at rest is as fast as they move.
+
+    Parameters
+    ----------
+    unit : callable
+        Returns that of a joint's position.
 
     Returns
     -------
     str or None
-        Which, by which step, and what to do; None where all are fine enough. Which joints slide, and how far, is not asked here.
+        Which, by which step, and what to do; None where all are fine enough.
     """
     part = item.longest
     nyquist = 0.5 * part.rate
@@ -78,7 +83,8 @@ def coarse_positions(item: PreparedRecording) -> str | None:
         noise = step / np.sqrt(12.0) * 2.0 * np.pi * np.sqrt(cut**3 / (3.0 * nyquist))
         speed = np.sqrt(np.mean((position[apart:] - position[:-apart]) ** 2)) * part.rate / apart
         if max(REST_NOISE * noise, slow[joint]) > speed > 0.0:
-            found.append((item.recording.joints[joint], step, part.bands[joint], float(np.ptp(position))))
+            name, way = item.recording.joints[joint], float(np.ptp(position))
+            found.append((name, step, part.bands[joint], way, unit(joint)))
     said = [
         _too_coarse([each for each in found if (each[3] < LITTLE * 2.0 * np.pi) is little], little=little)
         for little in (True, False)
@@ -86,20 +92,20 @@ def coarse_positions(item: PreparedRecording) -> str | None:
     return "; ".join(each for each in said if each) or None
 
 
-def _too_coarse(found: Sequence[tuple[str, float, float | None, float]], *, little: bool) -> str:
+def _too_coarse(found: Sequence[tuple[str, float, float | None, float, str]], *, little: bool) -> str:
     """Say what to do about joints with their steps, bands and ways, all of which move little or none."""
     if not found:
         return ""
-    joints, (_, step, band, way) = ", ".join(name for name, *_ in found), found[0]
+    joints, (_, step, band, way, unit) = ", ".join(name for name, *_ in found), found[0]
     within = "without a low-pass" if band is None else f"in a band of {band:.3g} Hz"
     told = f"{within} rest and motion cannot be told apart"
     if little:
         return (
-            f"positions of {joints} move by {way:.2g} (rad or m) in all, in steps of {step:.2g}, so little that {told}; "
+            f"positions of {joints} move by {way:.2g} {unit} in all, in steps of {step:.2g} {unit}, so little that {told}; "
             "move further and faster, or give a narrower band"
         )
     return (
-        f"positions of {joints} go in steps of {step:.2g} (rad or m), so coarse that {told}; record with a finer encoder, "
+        f"positions of {joints} go in steps of {step:.2g} {unit}, so coarse that {told}; record with a finer encoder, "
         "faster motion, or give a narrower band"
     )
 

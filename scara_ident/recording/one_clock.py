@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scara_ident.arrays import Array
 from scara_ident.manners import listed, several
 from scara_ident.recording.audit import Finding
+from scara_ident.recording.audit.clock import MIN_SAMPLES
 from scara_ident.recording.audit.samples import GAP_STEPS
 
 # Channels whose rows are the same but for this share were sampled together, and what lacks in one of them is a fault.
@@ -72,6 +73,24 @@ def on_one_clock(
     if not keep.all():
         result = {name: values[keep] for name, values in result.items()}
     return result, _findings(1 + len(apart) + len(lacking), clock, resampled, int(np.count_nonzero(~keep)))
+
+
+def sparse_channel(columns: Mapping[str, Array], wanted: Sequence[str]) -> str | None:
+    """Say which channel holds next to no numbers beside one that holds enough, as a command that is logged when it changes.
+
+    Returns
+    -------
+    str or None
+        None where all hold enough, or none does.
+    """
+    held = {name: int(np.count_nonzero(np.isfinite(columns[name]))) for name in wanted}
+    least, most = min(held, key=held.__getitem__), max(held.values())
+    if not 0 < held[least] < MIN_SAMPLES <= most:
+        return None
+    return (
+        f"column {least!r} holds a number in {several(held[least], 'row')}, where others do in {most}; at least {MIN_SAMPLES} "
+        "are needed: log it at a fixed rate, and not only when it changes"
+    )
 
 
 def _groups(here: Mapping[str, NDArray[np.bool_]]) -> list[list[str]]:

@@ -22,7 +22,7 @@ from scara_ident.recording.files import column_names, read_columns, shares_clock
 from scara_ident.recording.files.parquet_csv import write_columns
 from scara_ident.recording.files.parquet_rows import read_rows
 from scara_ident.recording.long_file import LongFile, long_file
-from scara_ident.recording.one_clock import on_one_clock
+from scara_ident.recording.one_clock import on_one_clock, sparse_channel
 from scara_ident.recording.paths import distinct_names, recording_name, recording_paths
 from scara_ident.recording.wanted import encoding_finding, lacking_numbers, optional_channels, refuse_missing
 from scara_ident.robot.signal_map import SIGNALS, Channel, Channels, contract_channels
@@ -274,6 +274,8 @@ def recording_of(
     columns = read([channel.column for channel in (*needed, *extra)])
     if shared_clock:
         asked = [channel.column for channel in needed[1:]]
+        if (sparse := sparse_channel(columns, asked)) is not None:
+            raise RecordingError(f"{path}: {sparse}")
         beside = [channel.column for channel in extra]
         columns, joined = on_one_clock(columns, channels.time.column, asked, beside)
         findings += joined

@@ -20,7 +20,13 @@ from scara_ident.estimation.saved import estimate_dict
 from scara_ident.estimation.urdf_scale import scale_sentence, urdf_scale
 from scara_ident.estimation.urdf_weight import rotor_sentence, told_scale
 from scara_ident.export.result import KEY, rebuild_entry
-from scara_ident.identification.identify import Identification, not_told_from_zero, undetermined, worst_validation
+from scara_ident.identification.identify import (
+    Identification,
+    not_told_from_zero,
+    of_unknown_std,
+    undetermined,
+    worst_validation,
+)
 from scara_ident.manners import listed
 from scara_ident.model.terms.friction import Friction
 from scara_ident.model.urdf_values import urdf_values
@@ -166,6 +172,12 @@ def _others(identification: Identification) -> list[str]:
     small = not_told_from_zero(identification)
     if small:
         found.append(f"Within two standard deviations of zero: {listed(small, MOST_NAMED)}.")
+    unsure = of_unknown_std(identification)
+    if unsure:
+        found.append(
+            f"How sure {listed(unsure, MOST_NAMED)} {'is' if len(unsure) == 1 else 'are'}, is not known: one stretch of time tells "
+            f"{'it' if len(unsure) == 1 else 'them'} all but alone, and nothing says how far another would differ; record longer."
+        )
     found.append(weights_said(identification.estimate))
     if identification.estimate.variation:
         found += [f"{said}." for said in identification.estimate.variation.sentences(robot)]

@@ -157,7 +157,9 @@ def _motion(design: Design) -> Figure:
         for time in [_times(trajectory)]
         for j, q in enumerate(trajectory.at(time)[0])
     ]
-    return single("motion", "Motion", "", Plot("time [s]", (Panel("position [rad or m]", layers, 260),)))
+    robot = design.model.robot
+    units = " or ".join(dict.fromkeys(map(robot.position_unit, range(robot.n))))
+    return single("motion", "Motion", "", Plot("time [s]", (Panel(f"position [{units}]", layers, 260),)))
 
 
 def _phases(design: Design) -> Figure:

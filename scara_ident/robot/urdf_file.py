@@ -48,11 +48,22 @@ def read_urdf(urdf: Path, source: Path) -> ElementTree.Element:
         raise RobotError(
             f"{urdf}: the encoding that its first line names cannot be read ({error}); save it in UTF-8"
         ) from None
+    _leave_namespace(root)
     if root.tag != "robot":
         raise RobotError(f"{urdf}: the root element is <{root.tag}>, a URDF has <robot>")
     if (fault := urdf_fault(root)) is not None:
         raise RobotError(f"{urdf}: not a usable URDF: {fault}")
     return root
+
+
+def _leave_namespace(root: ElementTree.Element) -> None:
+    """Take the default namespace off the elements that are in it: some URDFs name a schema, and other readers pass over it."""
+    space, end, _ = root.tag.partition("}")
+    if end:
+        for element in root.iter():
+            # A comment has a function for a tag.
+            if isinstance(element.tag, str):
+                element.tag = element.tag.removeprefix(space + end)
 
 
 def pinocchio_model(urdf: Path, tree: ElementTree.Element) -> pin.Model:

@@ -12,6 +12,7 @@ import pinocchio as pin
 from scara_ident.arrays import Array
 from scara_ident.errors import RobotError
 from scara_ident.robot.robot import Robot
+from scara_ident.robot.urdf_file import read_urdf
 
 
 def visual_boxes(robot: Robot) -> tuple[tuple[Array, Array], ...]:
@@ -32,7 +33,7 @@ def visual_boxes(robot: Robot) -> tuple[tuple[Array, Array], ...]:
     low = np.full((robot.n, 3), np.inf)
     high = np.full((robot.n, 3), -np.inf)
     body_of_joint = {int(k) + 1: i for i, k in enumerate(robot.order)}
-    for link in ElementTree.parse(robot.urdf).getroot().findall("link"):
+    for link in read_urdf(robot.urdf, robot.urdf).findall("link"):
         name = link.get("name", "")
         if not robot.model.existFrame(name, pin.FrameType.BODY):
             continue

@@ -35,8 +35,10 @@ def trial_motion(arm: VirtualArm, seed: int = 0, *, poses: int = POSES) -> Refer
         If the arm's weight alone exceeds a torque limit.
     """
     robot, random = arm.robot, np.random.default_rng(seed)
-    lower = np.where(np.isfinite(robot.lower), robot.lower, -REACH)
-    upper = np.where(np.isfinite(robot.upper), robot.upper, REACH)
+    # A range from 0 to 0, as drawing programs write it where none was set, is none: the arm was identified by its motion.
+    stated = robot.upper > robot.lower
+    lower = np.where(stated & np.isfinite(robot.lower), robot.lower, -REACH)
+    upper = np.where(stated & np.isfinite(robot.upper), robot.upper, REACH)
     middle, half = 0.5 * (lower + upper), np.minimum(0.5 * RANGE_SHARE * (upper - lower), REACH)
     places = middle[:, None] + half[:, None] * random.uniform(-1.0, 1.0, (robot.n, poses))
     places = np.concatenate([places, places[:, :1]], axis=1)

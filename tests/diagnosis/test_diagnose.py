@@ -210,11 +210,13 @@ def test_no_share_of_the_work_is_smaller_than_one_before_where_a_search_is_repea
 
 def test_without_a_reduction_ripple_of_the_motor_is_not_looked_for_and_that_is_said():
     runs = runs_that_repeat(0.1)
-    for reduction, said in ((1.0, True), (100.0, False)):
-        robot = replace(load_robot(), reduction=np.full(2, reduction))
+    for reduction, slides, said in ((1.0, False, True), (1.0, True, True), (100.0, True, False)):
+        robot = replace(load_robot(), reduction=np.full(2, reduction), prismatic=np.array([slides, False]))
         found = diagnose(robot, runs, bands=BANDS, catalogue=(Spring(),))
         assert found.unexplained is not None and found.unexplained.joint == "joint1"
-        assert any(note.startswith("joint1: no reduction is stated") for note in found.notes) is said
+        notes = [note for note in found.notes if note.startswith("joint1: no reduction is stated")]
+        assert len(notes) == said
+        assert all(note.endswith("over its pole pitch)") is slides for note in notes)
 
 
 def test_what_is_told_from_a_lower_band_is_of_one_model_and_what_is_left_is_judged_where_it_was_found(monkeypatch):

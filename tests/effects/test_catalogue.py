@@ -101,3 +101,10 @@ def test_no_joint_silently_becomes_the_first():
 def test_what_is_no_name_is_refused_as_a_type():
     with pytest.raises(ArgumentError, match="expected names, one after the other; found list"):
         effects_named(["spring"])  # type: ignore[arg-type]
+
+
+def test_what_settles_an_effect_of_a_joint_that_may_slide_is_no_angle() -> None:
+    """Of a carriage it was said that the memory of its friction is in angle."""
+    for effect in CATALOGUE:
+        if effect.name in ("presliding", "backlash"):
+            assert "angle" not in effect.experiment

@@ -162,10 +162,10 @@ def test_the_parts(robot: Robot):
     assert usable_data([])[0].recordings == ()
     with pytest.raises(RecordingError, match="no effort was recorded"):
         usable_data([bad])
-    assert with_rows(data, needed=True)[0] is data
+    assert with_rows(data, robot, needed=True)[0] is data
     short = prepare([cut(good, slice(0, 60))], (2.0, 2.0))
-    assert with_rows(short, needed=True)[0] is short
-    assert with_rows(short, needed=False)[0].recordings == ()
+    assert with_rows(short, robot, needed=True)[0] is short
+    assert with_rows(short, robot, needed=False)[0].recordings == ()
     check_rows(observe(build_model(robot, "basic"), prepare([good], (4.0, 4.0))))
 
 

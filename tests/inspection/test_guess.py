@@ -115,3 +115,37 @@ def test_positions_and_efforts_in_files_of_their_own_are_to_be_put_into_one(tmp_
     assert any("no positions found" in problem and "side by side in one" in problem for problem in efforts.problems)
     neither = inspected(save(tmp_path / "t.csv", {"time": MADE["time"]}), tmp_path, urdf)
     assert not any("side by side" in problem for problem in neither.problems)
+
+
+@pytest.mark.parametrize(
+    ("kind", "angle", "position", "taken"),
+    [
+        ("prismatic", "angle", "position", "position"),
+        ("prismatic", "pos_deg", "pos_mm", "pos_mm"),
+        ("revolute", "pos_deg", "pos_mm", "pos_deg"),
+    ],
+)
+def test_of_a_cart_and_its_pole_the_position_is_of_what_slides(tmp_path, kind, angle, position, taken):
+    """The angle of the pole was taken for that of the cart, in mm, as it came first; a length in mm for an angle."""
+    made = {"time": MADE["time"]}
+    for name in (angle, position) if kind == "prismatic" else (position, angle):
+        made[name] = 0.3 * MADE["joint1.position" if name == position else "joint2.position"]
+    made["force"] = MADE["joint1.effort"]
+    found = inspected(save(tmp_path / "a.csv", made), tmp_path, write_urdf(tmp_path / "arm.urdf", (Link(kind),)))
+    assert found.mapping["position"]["column"] == taken
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"), [("/joint_states/{joint}/{signal}", "rad"), ("/arm/{joint}/{signal}", "deg")]
+)
+def test_positions_of_joint_states_are_in_si_however_far_they_wind(tmp_path, name, unit):
+    """A motor that stood at 327 rad was read in degrees, as one without limits turns less."""
+    made = {"time": MADE["time"]}
+    for key, values in MADE.items():
+        if key != "time":
+            joint, signal = key.split(".")
+            wound = 327.0 if key == "joint1.position" else 0.0
+            made[name.format(joint=joint.replace("joint", "j"), signal=signal)] = values + wound
+    urdf = write_urdf(tmp_path / "arm.urdf", (Link("continuous"), Link("continuous")))
+    found = inspected(save(tmp_path / "a.csv", made), tmp_path, urdf)
+    assert found.mapping["position"]["unit"] == unit

@@ -165,10 +165,17 @@ def test_other_numbers_of_columns_say_nothing():
     assert told({"column_0": np.zeros(600)} | columns) == []
 
 
-@pytest.mark.parametrize("name", ["position/time", "arm/torque/time [s]", "pos/Time (ms)"])
+@pytest.mark.parametrize("name", ["position/time", "arm/torque/time [s]", "pos/Time (ms)", "Force.time"])
 def test_the_clock_of_a_group_is_no_position(name: str):
     assert meaning(name).quantity == "time"
     assert meaning(name.replace("ime", "orque")).quantity != "time"
+
+
+@pytest.mark.parametrize("name", ["Theta1.time", "/joint_2/position/stamp", "elbow.torque.time"])
+def test_the_clock_of_one_joint_is_neither_its_position_nor_the_arms(name: str):
+    """Of structures with time, as block diagrams save them, the times of the first were taken for the positions."""
+    said = meaning(name, ("shoulder", "elbow"))
+    assert said.quantity is None
 
 
 @pytest.mark.parametrize(

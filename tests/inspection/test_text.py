@@ -62,6 +62,18 @@ def test_a_rotor_that_the_urdf_does_not_state_is_asked_for_with_a_guess(tmp_path
     assert all("rotor_inertia" not in joint for joint in yaml.safe_load(text)["joints"].values())
 
 
+@pytest.mark.parametrize("slides", [True, False])
+def test_the_reduction_of_a_joint_that_slides_is_asked_for_in_rad_per_metre(tmp_path, slides):
+    """Motor turns per joint turn were asked for, and kg m^2 of what is kg."""
+    kind = "prismatic" if slides else "revolute"
+    urdf = write_urdf(tmp_path / "arm.urdf", (Link(kind), Link()))
+    made = {name.replace("joint", "j"): values for name, values in MADE.items()}
+    text = " ".join(inspected(save(tmp_path / "a.parquet", made), tmp_path, urdf).description.split("\n# "))
+    assert "reduction: motor turns per joint turn" in text
+    assert ("of a joint that slides motor rad per metre: 2 pi over a screw's lead" in text) is slides
+    assert ("(with reduction 1: seen at the joint, kg where it slides)" in text) is slides
+
+
 def test_no_rotor_is_asked_for_where_the_urdf_states_all(tmp_path):
     assert "rotor_inertia" not in (inspected(save(tmp_path / "a.parquet", MADE), tmp_path).description or "")
 

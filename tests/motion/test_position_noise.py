@@ -148,12 +148,12 @@ def test_an_encoder_too_coarse_for_its_band_is_named(bits: int, band: float, coa
     step = 2.0 * np.pi / 2**bits
     position = np.vstack([step * np.round(SMOOTH[0] / step), SMOOTH[1]])
     item = recording(load_robot(), "M_1", TIME, position, np.sin(3.0 * position))
-    said = coarse_positions(prepare([item], (band, band)).recordings[0])
+    said = coarse_positions(prepare([item], (band, band)).recordings[0], lambda _: "rad")
     if not coarse:
         assert said is None
         return
     assert said is not None
-    assert f"positions of joint1 go in steps of {step:.2g}" in said
+    assert f"positions of joint1 go in steps of {step:.2g} rad, so coarse" in said
     with pytest.raises(RecordingError, match="finer encoder"):
         identify(load_robot(), [replace(item, position=step * np.round(SMOOTH / step))], bands=[band, band])
 
@@ -164,11 +164,11 @@ def test_a_joint_that_hardly_moves_is_to_be_moved_and_the_other_to_have_a_finer_
     little = 1e-3 * SMOOTH[1]
     position = np.vstack([coarse * np.round(SMOOTH[0] / coarse), fine * np.round(little / fine)])
     item = recording(load_robot(), "M_1", TIME, position, np.sin(3.0 * position))
-    said = coarse_positions(prepare([item], (50.0, 50.0)).recordings[0])
+    said = coarse_positions(prepare([item], (50.0, 50.0)).recordings[0], ("rad", "m").__getitem__)
     assert said is not None
     first, second = said.split("; positions of ")
     assert first.startswith(
-        f"positions of joint2 move by {np.ptp(position[1]):.2g} (rad or m) in all, in steps of {fine:.2g}, so little"
+        f"positions of joint2 move by {np.ptp(position[1]):.2g} m in all, in steps of {fine:.2g} m, so little"
     )
     assert "move further and faster" in first
     assert "finer" not in first

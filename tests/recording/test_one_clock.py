@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scara_ident.recording.one_clock import on_one_clock
+from scara_ident.recording.one_clock import on_one_clock, sparse_channel
 
 
 def interleaved(*parts: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -85,3 +85,16 @@ def test_a_gap_in_what_may_lack_costs_no_row():
     assert said.kind == "resampled"
     assert np.count_nonzero(np.isnan(found["v"])) == 41
     assert np.isnan(found["empty"]).all()
+
+
+def test_a_command_that_is_logged_when_it_changes_is_named():
+    """6 usable samples were told of 18 000, and to record for longer."""
+    few = {"time": T[::40], "c": np.ones(5)}
+    made = interleaved(ARM, few)
+    said = sparse_channel(made, ["a", "b", "c"])
+    assert said is not None
+    assert said.startswith("column 'c' holds a number in 5 rows, where others do in 200; at least 50 are needed")
+    assert sparse_channel(made, ["a", "b"]) is None
+    # Too short a recording is one.
+    short = {name: values[:30] for name, values in ARM.items()}
+    assert sparse_channel(short | {"c": np.where(np.arange(30) < 5, 1.0, np.nan)}, ["a", "b", "c"]) is None

@@ -8,11 +8,15 @@ import numpy as np
 import pytest
 
 from scara_ident.diagnosis import diagnose
+from scara_ident.diagnosis.candidates.candidates import Candidate
 from scara_ident.diagnosis.evidence.outcome import Unexplained
 from scara_ident.diagnosis.fitting.effect_parameters import RotorInertia
 from scara_ident.diagnosis.held_out.gain import HeldOutGain
+from scara_ident.diagnosis.selection.confounding import Confounder
 from scara_ident.diagnosis.selection.tentative import TentativeEffect
 from scara_ident.effects import Parameter
+from scara_ident.effects.parameters import Member
+from scara_ident.effects.payload import FreePayloadChange, PayloadOfRecordings
 from scara_ident.effects.position import Spring
 from scara_ident.estimation.run_offsets import rms_of
 from scara_ident.inquiry.next_steps import next_steps
@@ -176,3 +180,24 @@ def test_what_is_unexplained_is_said_to_go_as_an_effect_that_no_arm_has():
     said = next(item for item in sentences(found) if item.startswith("Unexplained"))
     assert "it goes as spring of joint1 does" in said
     assert "it would push away from its rest position" in said
+
+
+def test_a_rival_of_its_own_name_is_told_from_it(result):
+    """A payload of one recording could not be told, it said, from payload_change."""
+    carried, taken_up, spring = PayloadOfRecordings(), FreePayloadChange(), Spring()
+    rivals = tuple(
+        Confounder(label, family.name, joint, 0.8, Candidate(family, member), (1.0,))
+        for label, family, joint, member in (
+            ("payload_change", taken_up, None, Member(None, (3.0,))),
+            ("spring of joint2", spring, "joint2", Member(1)),
+        )
+    )
+    found = replace(
+        result.effects[0], effect=carried.name, joint=None, description="a payload in a", confounded_with=rivals
+    )
+    assert found.rival_names(result.search.scene) == (
+        "payload_change (a payload of unknown mounting taken up or put down in the run)",
+        "spring of joint2",
+    )
+    said = " ".join(sentences(replace(result, effects=(found,))))
+    assert "cannot tell it from: payload_change (a payload of unknown mounting" in said

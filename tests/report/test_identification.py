@@ -114,6 +114,20 @@ def test_what_is_not_told_from_zero_is_named(result):
     assert "P_d1" not in small[0]
 
 
+def test_where_no_standard_deviation_is_known_that_is_said(result):
+    """Of a carriage pushed once a mass of 25.2 kg, with no standard deviation, was within two of zero."""
+    assert not [text for text in sentences(result) if text.startswith("How sure ")]
+    estimate = result.estimate
+    place = list(result.model.names).index("P_d1")
+    covariance = estimate.covariance.copy()
+    covariance[place, place] = np.inf
+    lost = replace(result, estimate=replace(estimate, covariance=covariance))
+    (said,) = (text for text in sentences(lost) if text.startswith("How sure "))
+    assert said.startswith("How sure P_d1 is, is not known: one stretch of time tells it all but alone")
+    (small,) = (text for text in sentences(lost) if text.startswith("Within two standard deviations of zero"))
+    assert "P_d1" not in small
+
+
 def test_the_weights_are_said(result, content):
     first, second = result.estimate.weights
     assert content["weights"] == {"joint1": first, "joint2": second}

@@ -18,6 +18,7 @@ from scara_ident.report.html.identification import IdentificationContext
 from scara_ident.report.html.remainder import signal_of
 from scara_ident.report.pictures import (
     MOST_RECORDINGS,
+    design_figures,
     design_picture,
     diagnosis_pictures,
     path_views,
@@ -112,6 +113,9 @@ def test_a_design_is_a_picture(tmp_path: Path):
     design = design_excitation(
         build_model(load_robot()), duration=4.0, harmonics=5, samples=120, trajectories=2, effort=effort
     )
+    (motion, _), *_ = design_figures(design)[1]
+    # No joint of this arm slides.
+    assert [panel.label for drawing in motion.variants.values() for panel in drawing.panels] == ["position [rad]"]
     design_picture(tmp_path / "new" / "preview.png", design)
     for color in ("blue", "vermillion", "sky"):
         assert share(tmp_path / "new" / "preview.png", color) > 2e-4

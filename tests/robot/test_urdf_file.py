@@ -31,3 +31,13 @@ def test_what_is_none_is_refused_in_one_line(tmp_path: Path, text: str, said: st
         read_urdf(urdf, tmp_path / "robot.yaml")
     with pytest.raises(RobotError, match=r"robot\.yaml: urdf: no such file"):
         read_urdf(tmp_path / "none.urdf", tmp_path / "robot.yaml")
+
+
+def test_the_namespace_of_a_schema_is_passed_over(tmp_path: Path) -> None:
+    """Drake's own URDFs name one, and were refused as having no <robot>."""
+    text = embedded_urdf().read_text(encoding="utf-8")
+    urdf = tmp_path / "arm.urdf"
+    urdf.write_text(text.replace("<robot ", '<robot xmlns="https://drake.mit.edu" ', 1), encoding="utf-8")
+    named, plain = read_urdf(urdf, urdf), read_urdf(embedded_urdf(), urdf)
+    assert [element.tag for element in named.iter()] == [element.tag for element in plain.iter()]
+    assert pinocchio_model(urdf, named).names.tolist() == pinocchio_model(urdf, plain).names.tolist()

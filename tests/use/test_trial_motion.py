@@ -36,3 +36,13 @@ def test_an_arm_that_cannot_hold_itself_is_refused() -> None:
     weak = replace(arm, robot=replace(arm.robot, effort_limit=np.full(6, 0.5)))
     with pytest.raises(RobotError, match="its weight alone exceeds the torque limits"):
         trial_motion(weak)
+
+
+def test_a_range_from_nought_to_nought_is_none() -> None:
+    """The arm stood still, no error of tracking was left."""
+    arm = virtual_arm(load_robot())
+    shut = replace(arm, robot=replace(arm.robot, lower=np.zeros(2), upper=np.zeros(2)))
+    free = replace(arm, robot=replace(arm.robot, lower=np.full(2, -np.inf), upper=np.full(2, np.inf)))
+    motion = trial_motion(shut, 1)
+    np.testing.assert_array_equal(motion.position, trial_motion(free, 1).position)
+    assert np.all(np.ptp(motion.position, axis=1) > 0.1)

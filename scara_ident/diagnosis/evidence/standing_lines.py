@@ -68,7 +68,8 @@ def standing_lines(residuals: Residuals, criteria: SelectionCriteria = CRITERIA)
     """Return for each joint the line that says that what is left is no noise, None where there is none.
 
     Within the band that is one that holds more of the power than noise may that is not white, above it one that is larger
-    than all that is left within.
+    than all that is left within. There positions are noise, which a prediction carries on, and which motions that are repeated
+    repeat as encoders round them: a line has to be in the torque itself.
 
     Parameters
     ----------
@@ -78,7 +79,7 @@ def standing_lines(residuals: Residuals, criteria: SelectionCriteria = CRITERIA)
     data = residuals.data
 
     def of_joint(j: int) -> StandingLine | None:
-        pieces, squares, fade = [], 0.0, []
+        pieces, recorded, squares, fade = [], [], 0.0, []
         for part, predicted, banded in zip(data.stretches, residuals.predicted, residuals.banded, strict=True):
             if not part.usable or part.samples <= 4 * part.trim or not np.any(part.used[j]):
                 continue
@@ -87,7 +88,8 @@ def standing_lines(residuals: Residuals, criteria: SelectionCriteria = CRITERIA)
                 continue
             inside = slice(part.trim, part.samples - part.trim)
             fade.append(part.fade[j][inside])
-            pieces.append(fade[-1] * (part.torque[j] - predicted[j])[inside])
+            recorded.append(fade[-1] * part.torque[j][inside])
+            pieces.append(recorded[-1] - fade[-1] * predicted[j][inside])
             squares += float(np.sum(banded[j][inside] ** 2))
         if not pieces or squares == 0.0:
             return None
@@ -95,7 +97,7 @@ def standing_lines(residuals: Residuals, criteria: SelectionCriteria = CRITERIA)
         within, rate, band = squares / len(moving), data.stretches[0].rate, data.bands[j]
         if not _may_have(pieces, rate, band, within, criteria):
             return None
-        line = _largest(j, pieces, rate, band, within, criteria)
+        line = _largest(j, pieces, recorded, rate, band, within, criteria)
         # Faded out at rest a line is as much smaller.
         return None if line is None else replace(line, amplitude=line.amplitude / float(np.mean(moving)))
 
@@ -118,7 +120,13 @@ def _may_have(
 
 
 def _largest(
-    joint: int, pieces: Sequence[Array], rate: float, band: float | None, within: float, criteria: SelectionCriteria
+    joint: int,
+    pieces: Sequence[Array],
+    recorded: Sequence[Array],
+    rate: float,
+    band: float | None,
+    within: float,
+    criteria: SelectionCriteria,
 ) -> StandingLine | None:
     """Return the line with the largest share beyond what is allowed."""
     highest = HIGHEST_FREQUENCY_SHARE * rate
@@ -129,6 +137,7 @@ def _largest(
     frequencies = np.array([line.position for line in found])
     power = frequency_spectrum(pieces, rate, frequencies)
     inside = np.full(len(found), True) if band is None else frequencies <= band
+    power = np.where(inside, power, np.minimum(power, frequency_spectrum(recorded, rate, frequencies)))
     share = power / within
     beyond = np.where(inside, share / criteria.least_colour, share)
     place = int(np.argmax(beyond))

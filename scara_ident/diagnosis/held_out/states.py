@@ -80,13 +80,14 @@ def _by_recording(found: Search, after: Estimate, data: PreparedData, optional: 
     if not optional and not own:
         return HeldOut(data, scene, found.chosen, (), correction)
     parted = [_parted(item.recording) for item in data.recordings]
-    heads, _ = with_rows(prepare([head for head, _ in parted], data.bands), needed=False)
+    heads, _ = with_rows(prepare([head for head, _ in parted], data.bands), scene.robot, needed=False)
     chosen, seen, notes = list(found.chosen), {}, []
     if correction is not None and own:
         training = [_parted(item.recording)[0] for item in found.uncorrected.data.recordings]
         bands = lower_bands(found.step)
         known, below = (
-            with_rows(prepare(firsts, bands), needed=False)[0] for firsts in (training, [head for head, _ in parted])
+            with_rows(prepare(firsts, bands), scene.robot, needed=False)[0]
+            for firsts in (training, [head for head, _ in parted])
         )
         correction, words = own_correction(found, after, known, below, scene, tuple(start))
         notes += words
@@ -100,7 +101,7 @@ def _by_recording(found: Search, after: Estimate, data: PreparedData, optional: 
         words = [found.chosen[k].label(found.scene) for k in seen.get(name, ())]
         shown = f"shows {'; '.join(words) or 'no effect that acts in some recordings only'}"
         notes.append(f"{name}: its first third {shown if name in seen else 'is too short to show which effects act'}")
-    rest, useless = with_rows(prepare([rest for _, rest in parted], data.bands), needed=False)
+    rest, useless = with_rows(prepare([rest for _, rest in parted], data.bands), scene.robot, needed=False)
     scene = moved_with(scene, found.chosen, chosen)
     notes += ["errors held out are of the other two thirds", *useless]
     return HeldOut(rest, scene, tuple(chosen), tuple(notes), correction)

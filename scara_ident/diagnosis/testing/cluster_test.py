@@ -49,7 +49,7 @@ class ClusterTest:
     covariance : ndarray, shape (g, k, k)
         Of these.
     freedom : ndarray, shape (g,)
-        Degrees of freedom of the covariance.
+        Degrees of freedom of the covariance; 0 where it is not known.
     """
 
     p_value: Array
@@ -92,12 +92,13 @@ def cluster_test(
     unbiased = scale @ np.einsum("gpi,gpj->gij", pairs, pairs) @ scale
     whitened = np.einsum("gij,gj->gi", back, value)
     known = np.all(strength > _LEAST_REDUNDANCY, axis=(1, 2))
-    least = _least(freedom)
+    # What one block alone holds has no scatter of its own, and a covariance of rounding alone.
+    least = np.where(known, _least(freedom), 0.0)
     together = _hotelling(whitened, unbiased, least, rank)
     few = (rank > 1) & (least - rank + 1.0 < FEW)
     p_value = np.where(few, _either(together, whitened, unbiased, freedom, rank), together)
     result = ClusterTest(np.where(known, p_value, 1.0), value, into @ unbiased @ into.transpose(0, 2, 1), least)
-    return _balanced(model, replace(products, columns=columns, scores=scores), result, (into, back, rank), known)
+    return _balanced(model, replace(products, columns=columns, scores=scores), result, (into, back, rank))
 
 
 def _balanced(
@@ -105,11 +106,10 @@ def _balanced(
     products: Products,
     result: ClusterTest,
     whitening: tuple[Array, Array, NDArray[np.intp]],
-    known: NDArray[np.bool_],
 ) -> ClusterTest:
     """Return a test, of little freedom made by weighted blocks where effects can then be smaller and still significant."""
     into, back, rank = whitening
-    places, weights, _ = _weights(model, products, (into, rank), np.where(known, result.freedom, 0.0), ASKED)
+    places, weights, _ = _weights(model, products, (into, rank), result.freedom, ASKED)
     if not len(places):
         return result
     into, few = into[places], _whitened(products, into, places)
@@ -294,7 +294,7 @@ def _hotelling(value: Array, covariance: Array, freedom: Array, rank: NDArray[np
     wald = np.einsum("gi,gij,gj->g", value, np.linalg.pinv(covariance, rcond=_RANK, hermitian=True), value)
     second = freedom - rank + 1.0
     tested = (second > 0.0) & (rank > 0)
-    second, first = np.where(tested, second, 1.0), np.maximum(rank, 1)
+    second, first, freedom = np.where(tested, second, 1.0), np.maximum(rank, 1), np.where(tested, freedom, 1.0)
     ratio = np.maximum(wald, 0.0) * second / (freedom * first)
     return np.where(tested, fdtrc(first, second, ratio), 1.0)
 

@@ -189,13 +189,24 @@ def _copies(
 
 
 def _is_hold(samples: Samples, same: NDArray[np.bool_], judged: NDArray[np.bool_]) -> bool:
-    if not judged.any():
+    """Tell whether most repetitions of the least repetitive channel are copies of a row.
+
+    Where that channel is new the row is no copy, and all others repeat by chance alone: so often they do by chance where it
+    repeats too, as those of a coarse encoder do that is read many times within a step.
+    """
+    from scipy.special import bdtrc
+
+    if not judged.any() or np.mean(same[judged]) < HELD_SHARE:
         return False
-    share = float(np.mean(same[judged]))
-    if share < HELD_SHARE:
+    repeats = np.array([(signal[1:] == signal[:-1])[judged] for signal in samples.channels()])
+    least = int(np.argmin(np.mean(repeats, axis=1)))
+    mine, others = repeats[least], np.all(np.delete(repeats, least, axis=0), axis=0)
+    new, count = int(np.count_nonzero(~mine)), int(np.count_nonzero(mine & others))
+    chance = (np.count_nonzero(others & ~mine) + 1.0) / (new + 2.0) if new else 0.0
+    whole = int(np.count_nonzero(mine))
+    if count / whole - chance <= HELD_OF_REPEATS * (1.0 - chance):
         return False
-    least = min(float(np.mean((signal[1:] == signal[:-1])[judged])) for signal in samples.channels())
-    return share > HELD_OF_REPEATS * least
+    return bool(bdtrc(count - 1, whole, chance) < UNLIKELY)
 
 
 def _by_chance(count: int, expected: float) -> bool:

@@ -175,8 +175,10 @@ def _effect_words(effect: FoundEffect, context: DiagnosisContext) -> list[Block]
         blocks += [Paragraph("It acts in these intervals:"), _interval_table(found)]
     if effect.confounded_with:
         others = ", ".join(
-            f"{confounder.label} (would remove {confounder.gain:.0%} in its place)"
-            for confounder in effect.confounded_with
+            f"{rival} (would remove {confounder.gain:.0%} in its place)"
+            for rival, confounder in zip(
+                effect.rival_names(context.diagnosis.search.scene), effect.confounded_with, strict=True
+            )
         )
         blocks.append(Paragraph(f"These recordings cannot tell it from: {others}."))
     return blocks
@@ -273,7 +275,7 @@ def _unknowable(context: DiagnosisContext) -> list[Block]:
     """Effects that these recordings, or any, cannot tell from another."""
     effects = context.diagnosis.effects
     groups = [
-        " | ".join((effect.title, *dict.fromkeys(confounder.label for confounder in effect.confounded_with)))
+        " | ".join((effect.title, *dict.fromkeys(effect.rival_names(context.diagnosis.search.scene))))
         for effect in effects
         if effect.confounded_with
     ]

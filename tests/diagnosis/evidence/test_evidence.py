@@ -73,6 +73,17 @@ def test_units_of_torque_change_nothing():
     assert left_of(1e6 * white) == pytest.approx(left_of(1e-6 * white), rel=1e-9)
 
 
+@pytest.mark.parametrize("samples", [150, 200])
+def test_a_run_of_one_block_shows_nothing(samples: int):
+    """A carriage pushed once for half a second was `complete`: of one block the scatter of all effects was rounding."""
+    run = exact_runs()[0]
+    assert run.effort is not None
+    short = replace(run, time=run.time[:samples], position=run.position[:, :samples], effort=run.effort[:, :samples])
+    found = diagnose(load_robot(), [short], bands=BANDS, model="basic")
+    assert [item.limit for item in found.evidence] == [1.0, 1.0]
+    assert found.verdict == "undecided"
+
+
 @pytest.fixture(scope="module")
 def nothing_missing():
     return diagnose(load_robot(), virtual_runs(), bands=BANDS)

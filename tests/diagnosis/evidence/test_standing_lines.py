@@ -82,6 +82,19 @@ def test_a_line_above_the_band_asks_for_a_wider_one():
     assert "at 40 Hz" in found.evidence[1].why
 
 
+def test_a_line_of_the_positions_alone_is_none_above_the_band():
+    """Of a cart on a rail what its encoder rounded away, the same in every repetition, was a line of 0.07 N at 53 Hz."""
+    recordings = []
+    for run in plain():
+        wavering = 1e-5 * np.sin(2.0 * np.pi * 30.0 * run.time)
+        recordings.append(replace(run, position=run.position + np.array([np.zeros_like(wavering), wavering])))
+    assert standing_lines(left_of(recordings)) == (None, None)
+    # With as much in the torque it is one of the torque.
+    _, line = standing_lines(left_of([with_tone(run, 30.0, 0.2, 0.4) for run in recordings]))
+    assert line is not None
+    assert line.frequency == pytest.approx(30.0, abs=0.02)
+
+
 @pytest.mark.parametrize(("size", "there"), [(0.1, False), (0.4, False), (1.0, True)])
 def test_within_the_band_a_line_counts_by_its_share(size: float, there: bool):
     """By the amplitude over that of all noise within the band: of 1.0 a third of the power is the line."""

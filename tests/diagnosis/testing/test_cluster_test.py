@@ -97,6 +97,8 @@ def test_a_column_of_one_block_cannot_be_tested():
         model_of(slow(rng, 3, length, 8.0) * 0.0 + 1e-3 * np.arange(length), torque, blocks), [{0: only[None]}]
     )
     assert found.p_value == 1.0
+    # Its covariance is rounding; with freedom it would promise that next to nothing is seen.
+    assert found.freedom == 0.0
 
 
 def test_significance_is_students_and_hotellings():

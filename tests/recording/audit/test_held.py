@@ -112,6 +112,28 @@ def test_noise_that_repeats_a_position_now_and_then_is_no_copy():
         assert stale_positions(samples) == (samples, [])
 
 
+def coarse(seed: int) -> Samples:
+    """Encoders whose steps last many rows, and efforts in steps above their noise."""
+    made = noisy(seed, count=8000, rate=1000.0)
+    position, effort = 6e-3 * np.rint(made.position / 6e-3), 0.05 * np.rint(made.effort / 0.05)
+    return Samples(made.source, made.robot, made.time, position, effort, made.row)
+
+
+def test_a_coarse_encoder_read_within_a_step_repeats_no_row():
+    """Positions repeat where efforts do as often as where they do not; what does both was left out, which cut the recording."""
+    for seed in range(5):
+        samples = coarse(seed)
+        assert np.mean(samples.repeats()) > 0.3
+        assert held_rows(samples) == (samples, [])
+
+
+def test_copies_beside_a_coarse_encoder_are_left_out():
+    at = np.arange(1, 8000, 2)
+    samples, (finding,) = held_rows(with_copies(coarse(1), at))
+    assert finding.count >= len(at)
+    assert not np.isin(at + 1, samples.row).any()
+
+
 def braking() -> Samples:
     """It brakes for five seconds; then nothing changes."""
     made = noisy(2, count=2000)
