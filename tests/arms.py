@@ -102,6 +102,7 @@ def in_unit(links: tuple[Link, ...], unit: float, folder: Path) -> Robot:
     return load_robot(folder / "robot.yaml")
 
 
+@cache
 def example_urdf(name: str) -> Path:
     """Return a URDF of example-robot-data by the end of its path, without loading any mesh."""
     files = distribution("example-robot-data").files or []

@@ -110,10 +110,12 @@ class Robot(Frozen):
         """Armatures that the size of the motors suggests, stated or not."""
         return guess_rotors(self.model, self.order, self.reduction, self.effort_limit, self.prismatic)
 
-    @property
+    @cached_property
     def row_scale(self) -> Array:
         """Recorded torque per joint torque, shape (n,): 1/N on the motor side, else 1."""
-        return 1.0 / self.reduction if self.effort_side == "motor" else np.ones(self.n)
+        scale = 1.0 / self.reduction if self.effort_side == "motor" else np.ones(self.n)
+        scale.flags.writeable = False
+        return scale
 
     @property
     def drive_sign(self) -> Array:

@@ -16,6 +16,8 @@ R = TypeVar("R")
 # A division by zero is infinite, as NumPy's; the caller of the arrays holds them.
 # The interpreter is free meanwhile, so that two arms move side by side.
 OPTIONS = {"error_model": "numpy", "_nrt": False, "nogil": True}
+# Of functions that Python never calls.
+NO_DOORS = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 SOURCES = ("compiled.py", "spatial.py", "plant.py", "external.py", "forces.py", "integrate.py", "loop.py")
 
 
@@ -33,7 +35,16 @@ def compiled(function: Callable[P, R]) -> Callable[P, R]:
 
 def compiled_within(function: Callable[P, R]) -> Callable[P, R]:
     """Compile a function that compiled ones call, and Python never: without a door for it the first run is a third shorter."""
-    return _compiled(function, {**OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True})
+    return _compiled(function, {**OPTIONS, **NO_DOORS})
+
+
+def compiled_in_place(function: Callable[P, R]) -> Callable[P, R]:
+    """Compile a function into each that calls it.
+
+    A call hands over some hundred numbers that tell where the arrays of a plant lie, which took as long as what was done
+    with them. What is called from few places and calls on is compiled so; of the rest it would only make compiling longer.
+    """
+    return _compiled(function, {**OPTIONS, **NO_DOORS, "forceinline": True})
 
 
 def _compiled(function: Callable[P, R], options: Mapping[str, Any]) -> Callable[P, R]:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.simulation.compiled import compiled_within
+from scara_ident.simulation.compiled import compiled_in_place, compiled_within
 from scara_ident.simulation.external import SHAFT_WAY, carry, slid
 from scara_ident.simulation.forces import Room, State, accelerate, settle
 from scara_ident.simulation.plant import Plant
@@ -41,7 +41,7 @@ def make_stages(x: State) -> Stages:
     return Stages(v, a, omega, alpha, trial, new)
 
 
-@compiled_within
+@compiled_in_place
 def _runge_kutta(plant: Plant, room: Room, x: State, s: Stages, t: float, h: float, drive: Array) -> None:
     """Fill ``s.new`` by one step of the classical method; stage 0 is there already."""
     n = x.q.shape[0]
@@ -72,7 +72,7 @@ def _runge_kutta(plant: Plant, room: Room, x: State, s: Stages, t: float, h: flo
             s.new.v[j] = s.new.omega[j]
 
 
-@compiled_within
+@compiled_in_place
 def first_stage(plant: Plant, room: Room, x: State, s: Stages, t: float, drive: Array) -> None:
     """Fill stage 0 at the state itself, after deciding what is carried and which standing joints stick."""
     n = x.q.shape[0]
@@ -92,7 +92,7 @@ def first_stage(plant: Plant, room: Room, x: State, s: Stages, t: float, drive: 
         accelerate(plant, room, t, x, x.theta, drive, s.a[0], s.alpha[0])
 
 
-@compiled_within
+@compiled_in_place
 def _first_to_stop(plant: Plant, x: State, s: Stages) -> int:
     """Return the joint whose velocity left its direction earliest in the step, by linear interpolation; -1: none."""
     first, earliest = -1, 2.0
@@ -135,7 +135,7 @@ def _instant_of_stop(
     return stopping, taken
 
 
-@compiled_within
+@compiled_in_place
 def step(plant: Plant, room: Room, x: State, s: Stages, t: float, h: float, drive: Array) -> int:
     """Advance the state by ``h``; stage 0 must be there. Returns the number of events.
 

@@ -7,13 +7,16 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from scara_ident import Identification, Recording, identify, load_robot, write_recording
+from scara_ident.cli.main import run as run_program
+from scara_ident.effects.catalogue import EFFECTS
+from scara_ident.identification import ESTIMATORS
 from tests.diagnosis.made import BANDS, exact_runs, virtual_runs, with_torque
 from tests.docs.pages import blocks
 from tests.plugins.made import make_installed
@@ -36,8 +39,35 @@ def program_beside(place: Path) -> Program:
     return call
 
 
+@pytest.fixture
+def program_here(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> Iterator[Callable[[Path], Program]]:
+    """The same in this process, which has loaded what each command would load anew."""
+
+    def look_again() -> None:
+        for names in (EFFECTS, ESTIMATORS):
+            names.refresh()
+
+    def beside(place: Path) -> Program:
+        monkeypatch.syspath_prepend(str(place))
+        look_again()
+
+        def call(*words: str | Path) -> subprocess.CompletedProcess[str]:
+            capfd.readouterr()
+            status = run_program([str(word) for word in words])
+            said = capfd.readouterr()
+            return subprocess.CompletedProcess(words, status, said.out, said.err)
+
+        return call
+
+    yield beside
+    monkeypatch.undo()
+    look_again()
+
+
 @pytest.fixture(scope="module")
-def program(tmp_path_factory: pytest.TempPathFactory) -> Program:
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     pytest.importorskip("hatchling", reason="needs the extra test: pip install '.[test]'")
     place = tmp_path_factory.mktemp("site")
     source = shutil.copytree(Path(__file__).parent / "arm_lab", tmp_path_factory.mktemp("source") / "arm_lab")
@@ -45,7 +75,12 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> Program:
     options = ["--no-index", "--no-deps", "--no-build-isolation", "--target", str(place)]
     done = subprocess.run([*pip, *options, str(source)], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    return program_beside(place)
+    return place
+
+
+@pytest.fixture(scope="module")
+def program(site: Path) -> Program:
+    return program_beside(site)
 
 
 def write_lab(recording: Recording, path: Path) -> Path:
@@ -68,11 +103,13 @@ def test_a_file_of_its_own_suffix_is_read_as_any_other(program: Program, tmp_pat
     np.testing.assert_allclose(found, values(identify(load_robot(), [run], bands=BANDS)), rtol=1e-9)
 
 
-def test_its_method_is_a_choice_of_the_command_line(program: Program, tmp_path: Path):
+def test_its_method_is_a_choice_of_the_command_line(
+    program_here: Callable[[Path], Program], site: Path, tmp_path: Path
+):
     runs = virtual_runs()[:3]
     for run in runs:
         write_recording(run, tmp_path / f"{run.name}.parquet")
-    done = program("identify", tmp_path, "--method", "median", "--band", "11", "--json")
+    done = program_here(site)("identify", tmp_path, "--method", "median", "--band", "11", "--json")
     assert (done.returncode, done.stderr) == (0, "")
     content = json.loads(done.stdout)
     alone = [values(identify(load_robot(), [run], method="ols", bands=BANDS)) for run in runs]
@@ -120,17 +157,16 @@ def test_the_page_about_it_shows_this_package():
     assert [line for line in lines if line not in own] == []
 
 
-def test_a_broken_package_harms_only_who_asks_for_it(tmp_path: Path):
+def test_a_broken_package_harms_only_who_asks_for_it(program_here: Callable[[Path], Program], tmp_path: Path):
     make_installed(
         tmp_path, "broken", "scara_ident.estimators", {"mean": "broken:mean", "ols": "broken:ols"}, "1 / 0\n"
     )
-    run = tmp_path / "F1_1.parquet"
-    write_recording(virtual_runs()[0], run)
-    program = program_beside(tmp_path)
-    done = program("identify", run, "--method", "mean")
+    recording = tmp_path / "F1_1.parquet"
+    write_recording(virtual_runs()[0], recording)
+    done = program_here(tmp_path)("identify", recording, "--method", "mean")
     assert (done.returncode, done.stderr.count("\n")) == (1, 1)
     assert "method 'mean' of the package broken cannot be loaded (ZeroDivisionError: " in done.stderr
-    done = program("identify", run, "--method", "ols")
+    done = program_beside(tmp_path)("identify", recording, "--method", "ols")
     note = "scara-ident: note: method 'ols' of the package broken is not used: the name is built in\n"
     assert (done.returncode, done.stderr) == (0, note)
 
@@ -149,12 +185,14 @@ class Pole(Effect):
 """
 
 
-def test_an_effect_whose_arithmetic_fails_is_an_error_of_a_line_where_asked_for_and_else_a_note(tmp_path: Path):
+def test_an_effect_whose_arithmetic_fails_is_an_error_of_a_line_where_asked_for_and_else_a_note(
+    program_here: Callable[[Path], Program], tmp_path: Path
+):
     make_installed(tmp_path, "poles", "scara_ident.effects", {"pole": "poles:Pole"}, BROKEN)
     runs = [str(tmp_path / f"{run.name}.parquet") for run in virtual_runs()]
     for run, path in zip(virtual_runs(), runs, strict=True):
         write_recording(run, Path(path))
-    program = program_beside(tmp_path)
+    program = program_here(tmp_path)
     said = "pole of joint1, joint2 cannot be tried: its columns are not finite on any recording; correct the effect"
     done = program("diagnose", *runs, "--band", "11", "--effects", "spring,pole")
     assert (done.returncode, done.stderr) == (1, f"scara-ident: effect {said} or do not ask for it\n")

@@ -36,6 +36,9 @@ def test_a_robot_is_loaded_by_its_name(name: str, file: str, joints: int):
 def test_every_name_can_be_given_on_a_command_line():
     robots = example_robots()
     assert len(robots) > 50
+    # What a caller does with them is the caller's.
+    robots.pop("ur3")
+    assert "ur3" in example_robots()
     assert all(path.is_file() for path in robots.values())
     assert all(example_urdf(name.upper()) == path for name, path in robots.items())
     # Also that with a point in it.
@@ -83,5 +86,6 @@ def test_without_the_package_it_is_said_what_to_install(monkeypatch: pytest.Monk
         raise PackageNotFoundError(name)
 
     monkeypatch.setattr(examples, "distribution", lost)
+    monkeypatch.setattr(examples, "_robots", examples._robots.__wrapped__)
     with pytest.raises(RobotError, match="pip install example-robot-data"):
         load_robot("ur5")

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from scara_ident.simulation import compiled as module
+from scara_ident.simulation import integrate
 from scara_ident.simulation.compiled import SOURCES, at_hand, compiled
 
 ROOM = Path(module.__file__).parent
@@ -29,7 +30,9 @@ def test_a_compiled_function_gives_what_the_function_gives():
 def test_every_module_with_compiled_functions_counts_among_the_sources():
     """Else machine code of an older source would be run after a change of it."""
     using = {
-        path.name for path in ROOM.glob("*.py") if re.search(r"^@compiled(_within)?$", path.read_text(), re.MULTILINE)
+        path.name
+        for path in ROOM.glob("*.py")
+        if re.search(r"^@compiled(_within|_in_place)?$", path.read_text(), re.MULTILINE)
     }
     assert using
     assert using <= set(SOURCES)
@@ -38,6 +41,12 @@ def test_every_module_with_compiled_functions_counts_among_the_sources():
         text = (ROOM / name).read_text(encoding="utf-8")
         inner = re.findall(r"^from scara_ident\.simulation\.(\w+) import", text, re.MULTILINE)
         assert {f"{each}.py" for each in inner} <= set(SOURCES), name
+
+
+@pytest.mark.parametrize("name", ["step", "first_stage", "_runge_kutta", "_first_to_stop"])
+def test_the_loop_hands_a_plant_to_none_of_its_steps(name: str):
+    """To call them takes as long as what they do, and the whole loop twice as long."""
+    assert getattr(integrate, name).targetoptions["forceinline"]
 
 
 @pytest.mark.parametrize("changed", SOURCES)
