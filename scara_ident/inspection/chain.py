@@ -13,9 +13,6 @@ from scara_ident.errors import UsageError
 from scara_ident.robot.description import RobotDescription
 from scara_ident.robot.robot import Robot, build_robot
 
-# rad or m by which a joint that is to be locked may move before it is said.
-MOST_TRAVEL = 0.01
-
 
 def arm_of(urdf: Path, pattern: str | None = None) -> Robot:
     """Return the arm of a URDF: its joints but for coupled ends (see `scara_ident.robot.mimic`), or those of a pattern.
@@ -102,11 +99,6 @@ def with_locked(
             notes.append(f"{', '.join(robot.joints[k] for k in group)}: {why}: taken as locked")
     kept = [k for k in joints if k not in (*idle, *beside)]
     left = [robot.joints[k] for k in range(robot.n) if k not in kept]
-    for name, _ in robot.locked:
-        values = _positions(name, numbers)
-        travel = float(np.ptp(values)) if len(values) else 0.0
-        if travel > MOST_TRAVEL:
-            notes.append(f"{name}: moves by {travel:.2g} in the file, and is taken as locked")
     locked = {name: _place(name, numbers) for name in (*left, *(name for name, _ in robot.locked))}
     return kept, locked, notes
 

@@ -21,6 +21,7 @@ from scara_ident.recording.even_rows import with_even_clock
 from scara_ident.recording.files import column_names, read_columns, shares_clock
 from scara_ident.recording.files.parquet_csv import write_columns
 from scara_ident.recording.files.parquet_rows import read_rows
+from scara_ident.recording.locked import locked_channels, moving_though_locked
 from scara_ident.recording.long_file import LongFile, long_file
 from scara_ident.recording.one_clock import on_one_clock, sparse_channel
 from scara_ident.recording.paths import distinct_names, recording_name, recording_paths
@@ -271,13 +272,16 @@ def recording_of(
     findings += stated
     second = {k: place for k, place in enumerate(channels.link_position) if place.column in names}
     extra = (*chain.from_iterable(optional.values()), *second.values())
-    columns = read([channel.column for channel in (*needed, *extra)])
+    locked = locked_channels(robot, channels, names)
+    columns = read([channel.column for channel in (*needed, *extra, *locked.values())])
+    beside = {channel.column: columns.pop(channel.column) for channel in locked.values()}
+    findings += moving_though_locked(robot, locked, beside)
     if shared_clock:
         asked = [channel.column for channel in needed[1:]]
         if (sparse := sparse_channel(columns, asked)) is not None:
             raise RecordingError(f"{path}: {sparse}")
-        beside = [channel.column for channel in extra]
-        columns, joined = on_one_clock(columns, channels.time.column, asked, beside)
+        lacking = [channel.column for channel in extra]
+        columns, joined = on_one_clock(columns, channels.time.column, asked, lacking)
         findings += joined
 
     def rows(wanted: Sequence[Channel]) -> Array:

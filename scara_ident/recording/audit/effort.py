@@ -61,7 +61,7 @@ def dead_effort(samples: Samples) -> Checked:
                 samples.refuse(
                     f"{name}.effort is {values[0]:g} throughout although the joint moves by "
                     f"{np.ptp(samples.position[joint]):.3g} {samples.robot.position_unit(joint)}: a dead channel; "
-                    f"record it again, or identify without {name}"
+                    f"record it again, or identify without {name} from recordings in which it stands"
                 )
             said = f"{name}.effort is {values[0]:g} throughout, and the joint does not move: used as it is"
             found.append(Finding("dead_effort", said, samples.count))
