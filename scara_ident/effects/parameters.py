@@ -56,6 +56,8 @@ class NonlinearParameter:
         Whether it is a way of the joint: of one that slides ``lower`` and ``upper`` are multiples of `Scene.radian`.
     told_as : float or None
         The power of it that the data tell, see `Parameter`; None for what it is refined in, its logarithm or itself.
+    jumps : bool
+        Whether it is an instant, s, at which the columns jump.
     """
 
     name: str
@@ -65,6 +67,7 @@ class NonlinearParameter:
     logarithmic: bool = True
     of_length: bool = False
     told_as: float | None = None
+    jumps: bool = False
 
     def parameter(self, value: float, std: float, unit: str) -> Parameter:
         """Return it as a physical parameter."""

@@ -47,7 +47,9 @@ class PayloadChange(Effect):
     name = "payload_change"
     summary = "a payload taken up or put down in the run"
     coefficients = (Coefficient("mass", "kg", "mass at the tool from some time in the run on"),)
-    nonlinear: ClassVar[tuple[NonlinearParameter, ...]] = (NonlinearParameter("time", "s", 0.0, np.inf, False),)
+    nonlinear: ClassVar[tuple[NonlinearParameter, ...]] = (
+        NonlinearParameter("time", "s", 0.0, np.inf, False, jumps=True),
+    )
     on_links = True
     view = View("time")
     experiment = "repeat the run with the payload fastened, and once without it"

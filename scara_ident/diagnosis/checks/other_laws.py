@@ -12,6 +12,7 @@ from itertools import chain
 import numpy as np
 from numpy.typing import NDArray
 
+from scara_ident.diagnosis.checks.instants import with_instants_of_each
 from scara_ident.diagnosis.checks.other_minima import as_good, widened
 from scara_ident.diagnosis.checks.same_errors import same
 from scara_ident.diagnosis.fitting.effect_parameters import LinearParameters, PhysicalParameters, physical_parameters
@@ -43,6 +44,7 @@ def parameters_of_laws(step: SelectionStep) -> PhysicalParameters:
             if same_rows or item.effect.together:
                 effects[place] = widened(effects[place], told.effects[place])
         linear = _apart(linear, told, np.arange(len(linear.value)) if same_rows else _places(step, own))
+    effects = [with_instants_of_each(step, place, told) for place, told in enumerate(effects)]
     return replace(own, effects=tuple(effects), linear=linear)
 
 
