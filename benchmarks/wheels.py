@@ -14,6 +14,8 @@ import subprocess
 import sys
 import tempfile
 import time
+import tomllib
+from itertools import chain
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -60,12 +62,18 @@ def run(words: list[str | Path], folder: Path) -> str:
     return done.stdout.strip()
 
 
-def install(own: Path, wanted: str, folder: Path, *, lowest: bool) -> None:
+def install(own: Path, wanted: str, extras: list[str], folder: Path, *, lowest: bool) -> None:
     """Install a wheel and what it needs, the newest or the oldest that will do."""
     if lowest:
         run([own, "-m", "pip", "install", "--quiet", "uv"], folder)
+        # Of a wheel only what is named beside it counts as direct.
+        project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+        named = [
+            *project["dependencies"],
+            *chain.from_iterable(project["optional-dependencies"][name] for name in extras),
+        ]
         words: list[str | Path] = ["uv", "pip", "install", "--quiet", "--python", own, "--resolution", "lowest-direct"]
-        run([own, "-m", *words, wanted], folder)
+        run([own, "-m", *words, wanted, *named], folder)
     else:
         run([own, "-m", "pip", "install", "--quiet", wanted], folder)
 
@@ -78,7 +86,7 @@ def check(python: str, wheel: Path, extras: list[str], folder: Path, *, lowest: 
     run([python, "-m", "venv", place], folder)
     own = place / "bin" / "python"
     wanted = f"{wheel}[{','.join(extras)}]" if extras else str(wheel)
-    install(own, wanted, folder, lowest=lowest)
+    install(own, wanted, extras, folder, lowest=lowest)
     installed = time.monotonic() - began
     work = place / "work"
     work.mkdir()
