@@ -21,7 +21,7 @@ from scara_ident.recording.even_rows import with_even_clock
 from scara_ident.recording.files import column_names, read_columns, shares_clock
 from scara_ident.recording.files.parquet_csv import write_columns
 from scara_ident.recording.files.parquet_rows import read_rows
-from scara_ident.recording.locked import locked_channels, moving_though_locked
+from scara_ident.recording.locked import read_beside_locked
 from scara_ident.recording.long_file import LongFile, long_file
 from scara_ident.recording.one_clock import on_one_clock, sparse_channel
 from scara_ident.recording.paths import distinct_names, recording_name, recording_paths
@@ -272,10 +272,9 @@ def recording_of(
     findings += stated
     second = {k: place for k, place in enumerate(channels.link_position) if place.column in names}
     extra = (*chain.from_iterable(optional.values()), *second.values())
-    locked = locked_channels(robot, channels, names)
-    columns = read([channel.column for channel in (*needed, *extra, *locked.values())])
-    beside = {channel.column: columns.pop(channel.column) for channel in locked.values()}
-    findings += moving_though_locked(robot, locked, beside)
+    wanted = [channel.column for channel in (*needed, *extra)]
+    columns, moving = read_beside_locked(wanted, names, read, robot, channels)
+    findings += moving
     if shared_clock:
         asked = [channel.column for channel in needed[1:]]
         if (sparse := sparse_channel(columns, asked)) is not None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,7 @@ from scara_ident.robot.description import RobotDescription
 from scara_ident.robot.robot import Robot, build_robot, embedded_urdf
 from scara_ident.robot.signal_map import Channel, contract_channels
 from tests.made_recordings import columns, save
+from tests.recording.made import csv_lines, write_text
 
 
 @pytest.fixture(scope="module")
@@ -53,3 +56,20 @@ def test_travel_is_judged_in_the_unit_of_the_column_and_numbers_that_lack_do_not
     assert moving_though_locked(first_joint, degrees, {"q2": still}) == []
     assert len(moving_though_locked(first_joint, degrees, {"q2": moving})) == 1
     assert moving_though_locked(first_joint, degrees, {"q2": np.full(3, np.nan)}) == []
+
+
+def test_a_column_that_an_identified_joint_has_is_none_of_a_locked_one(first_joint: Robot):
+    """Two joints of which one stands in a column named after the locked one: it was taken from its own joint."""
+    mapped = contract_channels(("joint1", "elbow"))
+    mapped = replace(mapped, position=(mapped.position[0], Channel("joint2.position")))
+    robot = replace(first_joint, joints=("joint1", "elbow"))
+    assert locked_channels(robot, mapped, ("time", "joint1.position", "joint2.position")) == {}
+
+
+def test_a_text_in_the_column_of_a_locked_joint_is_no_matter(first_joint: Robot, tmp_path):
+    lines = csv_lines(200)
+    place = lines[0].split(",").index("joint2.position")
+    words = lines[3].split(",")
+    words[place] = "off"
+    path = write_text(tmp_path / "run_1.csv", [*lines[:3], ",".join(words), *lines[4:]])
+    assert len(read_recording(path, first_joint).time) == 200
