@@ -35,7 +35,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PANDA = tuple(f"panda_joint{k}" for k in range(1, 8))
 UR5 = tuple(f"{name}_joint" for name in ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3"))
 # Of those that keep all rows: the most samples at which their arrays leave this machine's memory free.
-MOST_ROWS = 4_000_000
+MAX_ROWS = 4_000_000
 # Samples at which it is found whether one or two BLAS threads suit them; above so many they are measured once.
 PROBED = 20_000
 ONCE_FROM = 100_000
@@ -114,7 +114,7 @@ def arrays(asked: Asked) -> list[dict[str, Any]]:
             for way in ("loop", "figaroh")
         }
         for samples in (10_000, 100_000, 1_000_000):
-            held = {way: blas for way, blas in slow.items() if samples * len(names) <= MOST_ROWS}
+            held = {way: blas for way, blas in slow.items() if samples * len(names) <= MAX_ROWS}
             if samples == 1_000_000:
                 held.pop("figaroh", None)
             runs = in_turn(asked, {"scara_ident": 1} | held, arm, samples)

@@ -255,10 +255,10 @@ def report(
     print(f"\nShare of {DRAWS} draws of {PAPER_SAMPLES} samples in which they hold, and in how many of {len(effects)}")
     print("effects, each at its nearest size, they hold in most draws")
     print(" ".join(f"{item['name']} x {item['factor']:g}," for item in shown))
-    content["effects_where_most_draws_hold"] = {}
+    content["effects_where_max_draws_hold"] = {}
     for name in shown[0]["one_run"]["holds"]:
         count = sum(holds[name] > 0.5 for holds in effects)
-        content["effects_where_most_draws_hold"][name] = count
+        content["effects_where_max_draws_hold"][name] = count
         print("".join(f"{item['one_run']['holds'][name]:7.0%}" for item in shown) + f"{count:6d}  {name}")
     content["campaigns"] = {}
     for key, found in runs.items():

@@ -23,7 +23,7 @@ from virtual_motions import random_motion
 from scara_ident.diagnosis.candidates.candidates import Candidate, CandidateColumns, columns_at_hand
 from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.diagnose import Diagnosis, diagnose
-from scara_ident.diagnosis.evidence.evidence import least_found
+from scara_ident.diagnosis.evidence.evidence import min_found
 from scara_ident.diagnosis.fitting.linearised import linearise
 from scara_ident.diagnosis.fitting.trust_region import least_squares
 from scara_ident.diagnosis.testing.cluster_test import needed
@@ -141,7 +141,7 @@ def shown(found: Diagnosis, runs: Sequence[SimulationResult], name: str) -> str:
     own = decision.examination
     errors = abs(float(own.value[0])) / float(np.sqrt(own.covariance[0, 0]))
     limits = [
-        least_found(found.search, item)[name].value
+        min_found(found.search, item)[name].value
         for item in best_of_each(found.search.decisions).values()
         if item.label == decision.label
     ]

@@ -28,7 +28,7 @@ from scipy.special import ndtr
 
 from scara_ident.arrays import Array
 from scara_ident.fleet.causes import TOLD_RUNS
-from scara_ident.fleet.changes import LEVEL, arms_counted, least_probability, trials_of
+from scara_ident.fleet.changes import LEVEL, arms_counted, min_probability, trials_of
 from scara_ident.fleet.fleet import changes_of
 from scara_ident.fleet.folder import list_fleet
 from scara_ident.fleet.history import DateRows, History, common_removed, noise_of
@@ -180,7 +180,7 @@ def healthy(fleets: int, seed: int, dates: Sequence[int]) -> None:
             some = [with_dates(item, count) for item in each]
             scatter = fleet_scatter(some)
             tried = trials_of(some[0], scatter)
-            least.append([least_probability(item, scatter, tried) for item in some])
+            least.append([min_probability(item, scatter, tried) for item in some])
         named = sum(arms_counted(own) * min(own) < LEVEL for own in least)
         arms = np.ravel(least)
         tail = ", ".join(f"{np.sum(arms < p)} below {p:g} ({len(arms) * p:.1f})" for p in (0.1, 0.01, LEVEL / FLEET))

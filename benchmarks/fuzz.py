@@ -40,7 +40,7 @@ from scara_ident.simulation.simulate import free_motion
 
 LONGEST = 10.0  # s of the processor
 PATIENCE = 120.0  # s by the clock, on a machine that does other things too: what only waits is found by this
-MOST_MEMORY = 3e9
+MAX_MEMORY = 3e9
 NOT_MADE = "not made"  # a fault of this program, counted as none of the other's
 ALLOWED = 1.0  # GB, as --max-memory; the program itself and what is made of a recording come on top
 
@@ -92,7 +92,7 @@ def run_one(words: list[str], work: Path, *, anew: bool = False) -> Outcome:
     lines = [line for line in said.splitlines() if "scara-ident: note:" not in line]
     left = [p for p in work.parent.rglob("*") if p.is_file() and p not in before and p != told]
     beside = [path for path in left if work / "out" not in path.parents and "seeds" not in path.parts]
-    if verdict is None and usage.ru_maxrss * 1024 > MOST_MEMORY:
+    if verdict is None and usage.ru_maxrss * 1024 > MAX_MEMORY:
         verdict = "over memory"
     if verdict is None and os.WIFSIGNALED(status):
         number = os.WTERMSIG(status)

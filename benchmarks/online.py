@@ -25,7 +25,7 @@ from scara_ident.simulation import virtual_arm
 SECONDS, NOISE_SHARE = 40.0, 0.05
 BLOCKS = (64, 512, 2048, 8192)
 # Runs side by side; rounds of the motion in which the first is compared with the package, and how near it is to be.
-MOST_LANES, COMPARED, SAME = 100, 12, 1e-9
+MAX_LANES, COMPARED, SAME = 100, 12, 1e-9
 TOLD_ROUNDS = 6
 # Share of the arm's mass, and how often it is attached.
 PAYLOAD, PAYLOAD_RUNS = 0.05, 50
@@ -80,7 +80,7 @@ def false_alarms(hours: float, seed: int) -> None:
     motion = motion_of(model, rate, 300.0)
     clean, sigma = torque_of(model, motion)
     blocks = blocks_of(model, sigma, motion, settings.block)
-    lanes, random = Lanes(model, settings, max(1, min(MOST_LANES, round(hours)))), np.random.default_rng(seed)
+    lanes, random = Lanes(model, settings, max(1, min(MAX_LANES, round(hours)))), np.random.default_rng(seed)
     online, alarms, apart = OnlineIdentifier(model, sigma, settings), [], 0.0
     rounds = max(1, round(hours / lanes.lanes * 12.0))
     for turn in range(rounds):

@@ -24,7 +24,7 @@ CONTROLLER_RATE = 500.0
 BITS = (12, 23)
 NOISE = (0.003, 0.05)
 DURATION = (5.0, 30.0)
-MOST_RECORDINGS = 8
+MAX_RECORDINGS = 8
 HELD_OUT_DURATION = (8.0, 15.0)
 # Half widths of what is drawn evenly: friction by run, torque scale and offset (a share of the usual torque) by day, and
 # the largest delay by run, s.
@@ -174,7 +174,7 @@ def draw_conditions(rng: np.random.Generator, asked: Asked) -> Conditions:
 
 
 def _draw_runs(rng: np.random.Generator, asked: Asked, days: int) -> tuple[Run, ...]:
-    count = int(rng.integers(1, MOST_RECORDINGS + 1)) if asked.recordings is None else asked.recordings
+    count = int(rng.integers(1, MAX_RECORDINGS + 1)) if asked.recordings is None else asked.recordings
     motions = count
     if count > 1 and rng.random() < 0.5:
         motions = int(rng.integers(max(1, count // 3), count))

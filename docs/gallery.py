@@ -263,7 +263,7 @@ def draw(path: Path, told: Figure) -> None:
     """Draw a figure with few colours, which keeps the file small."""
     from PIL import Image, ImageOps
 
-    canvas("", [[told]], least_width=WIDTH).savefig(path, dpi=DPI)
+    canvas("", [[told]], min_width=WIDTH).savefig(path, dpi=DPI)
     with Image.open(path) as image:
         full = image.convert("RGB")
     # Without the white about it.

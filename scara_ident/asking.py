@@ -36,7 +36,7 @@ State = Literal["record", "settled", "untold"]
 # A motion is worth recording if it brings the answers so many times further apart than they are.
 WORTH = 1.5
 # How often recordings are asked for to answer one question, and to lower what they hardly show.
-MOST_ASKED, ONCE = 2, 1
+MAX_REQUESTS, ONCE = 2, 1
 NOTE = "ask.json"
 FILES = ("trajectory.csv", "trajectory.yaml", "excitation.json")
 UNFINISHED = ".scara-ident-*"
@@ -251,8 +251,8 @@ def _designed(folder: Path, settings: Settings, recordings: Sequence[Path], aske
     left = still_open(inquiry, content["verdict"], asked.times)
     if not left:
         _removed(folder)
-        tired = [item.text for item in inquiry.questions if asked.times.get(key_of(item), 0) >= MOST_ASKED]
-        words = f"Asked {MOST_ASKED} times and still open: {'; '.join(tired)}." if tired else "Nothing is open."
+        tired = [item.text for item in inquiry.questions if asked.times.get(key_of(item), 0) >= MAX_REQUESTS]
+        words = f"Asked {MAX_REQUESTS} times and still open: {'; '.join(tired)}." if tired else "Nothing is open."
         return _note(folder, replace(asked, state="untold" if tired else "settled", words=words))
     inquiry = inquiry_of({**content, "next": [item.entry() for item in left]}, settings.robot, read)
     design = design_excitation(
@@ -308,7 +308,7 @@ def still_open(inquiry: Inquiry, verdict: str, times: Mapping[str, int]) -> list
     """
     found = []
     for question in inquiry.questions:
-        most = ONCE if _general(question) and verdict != "undecided" else MOST_ASKED
+        most = ONCE if _general(question) and verdict != "undecided" else MAX_REQUESTS
         if times.get(key_of(question), 0) < most:
             found.append(question)
     return found

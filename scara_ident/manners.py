@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 # Characters of a line of a terminal or notebook that names a thing, and rows of a table in a notebook.
 LONGEST_LINE = 180
-MOST_ROWS = 60
+MAX_ROWS = 60
 
 
 class Frozen:
@@ -128,9 +128,9 @@ class Reported(Frozen):
         head = "".join(f"<th>{escape(name)}</th>" for name in table)
         rows = [
             "".join(f"<td>{escape(_cell(values[k]))}</td>" for values in table.values())
-            for k in range(min(count, MOST_ROWS))
+            for k in range(min(count, MAX_ROWS))
         ]
-        more = f"<p>{count - MOST_ROWS} more rows</p>" if count > MOST_ROWS else ""
+        more = f"<p>{count - MAX_ROWS} more rows</p>" if count > MAX_ROWS else ""
         body = "".join(f"<tr>{row}</tr>" for row in rows)
         return f"<p>{escape(repr(self))}</p><table><tr>{head}</tr>{body}</table>{more}"
 

@@ -13,7 +13,7 @@ from rich.text import Text
 from scara_ident.progress import Tell
 
 # Before so much is done, and so many seconds have gone, how long the rest takes is not said.
-LEAST_SHARE, LEAST_SECONDS = 0.02, 2.0
+MIN_SHARE, MIN_SECONDS = 0.02, 2.0
 
 
 class TimeLeft:
@@ -36,7 +36,7 @@ class TimeLeft:
         if done > self._done:
             self._done = min(done, 1.0)
             gone = self._clock() - self._start
-            if self._done >= LEAST_SHARE and gone >= LEAST_SECONDS:
+            if self._done >= MIN_SHARE and gone >= MIN_SECONDS:
                 self._end = self._start + gone / self._done
         return self._done
 

@@ -29,7 +29,7 @@ class SelectionCriteria:
         "of less of a column outside the model only rounding is left",
         "effects/spanned.py: above what a URDF loses by few digits",
     )
-    least_outside: float = _criterion(
+    min_outside: float = _criterion(
         5e-4,
         "share of its square",
         "what the model nearly spans is known by its own small errors only, unless it removes most of what is left (`dominant`)",
@@ -46,7 +46,7 @@ class SelectionCriteria:
         "of letting any effect in where nothing is missing, over all candidates tried; asked in some five rounds",
         "Bonferroni: 1 % over a diagnosis",
     )
-    least_gain: float = _criterion(
+    min_gain: float = _criterion(
         0.05,
         "share of squared residual",
         "removed on rows that it was not fitted to; below it is the detection limit",
@@ -58,16 +58,16 @@ class SelectionCriteria:
         "what removes as much leaves little but noise on its joint, and is tested by single rows too",
         "diagnosis/testing/row_test.py",
     )
-    least_votes: float = _criterion(
+    min_votes: float = _criterion(
         0.75, "of voting trajectories", "an effect of the arm helps on most motions that excite it", "docs/decisions.md"
     )
-    least_size: float = _criterion(
+    min_size: float = _criterion(
         2.5,
         "standard deviations",
         "by which its size differs from none with its nonlinear parameters free",
         "1 % two-sided",
     )
-    least_final_size: float = _criterion(
+    min_final_size: float = _criterion(
         3.0,
         "standard deviations",
         "by which its coefficients differ from none beside all that was found",
@@ -85,11 +85,11 @@ class SelectionCriteria:
         0.4, "1 / motor turn", "slower changes over the motor's angle are motion, not gear"
     )
     highest_order: float = _criterion(13.0, "1 / motor turn", "gears and motors have orders up to 12")
-    least_line_periods: float = _criterion(
+    min_line_periods: float = _criterion(
         6.0, "periods in a recording", "a slower line in time is not told from the motion's own harmonics"
     )
     # Searching.
-    most_effects: int = _criterion(
+    max_effects: int = _criterion(
         3,
         "effects per joint, and of the whole arm",
         "more at once are not believed, and what is left is then not called noise",
@@ -97,18 +97,18 @@ class SelectionCriteria:
     near_best: float = _criterion(
         0.6, "of the best gain", "families worth refining before one is chosen: a grid point loses up to 40 %"
     )
-    most_refined: int = _criterion(4, "families", "refined at once, for time")
+    max_refined: int = _criterion(4, "families", "refined at once, for time")
     dominant: float = _criterion(
         0.5,
         "share of squared residual",
         "a family whose grid point removes as much is fitted, or another band tried for it, however few blocks show it; what does is no small error of the model",
     )
-    most_fitted: int = _criterion(
+    max_fitted: int = _criterion(
         2,
         "candidates",
         "fitted with all else in one round, for time: an elastic joint is simulated anew in every step of a fit",
     )
-    least_without_noise: float = _criterion(
+    min_without_noise: float = _criterion(
         0.5,
         "of the squared torque",
         "what an effect must keep without the noise of the positions: noise of many rows is as sure as an effect",
@@ -123,7 +123,7 @@ class SelectionCriteria:
         "of its size",
         "by which it is another one there, or less where noise could make it, or another once it was taken out of the data: a column of first order says too little of a long delay",
     )
-    least_beside_rest: float = _criterion(
+    min_beside_rest: float = _criterion(
         0.5,
         "of what it removes",
         "that an effect must still remove beside the rest of a correction of the data that does as well in its place",
@@ -136,13 +136,13 @@ class SelectionCriteria:
         "that signals explain on other trajectories to be called a remainder",
         "docs/diagnosis.md",
     )
-    least_remainder: float = _criterion(
+    min_remainder: float = _criterion(
         0.01,
         "of the joint's torque",
         "sampling, filters and friction about a reversal leave as much",
         "docs/diagnosis.md",
     )
-    least_remainder_of_runs: float = _criterion(
+    min_remainder_of_runs: float = _criterion(
         0.02,
         "of the joint's torque",
         "the same where runs differ: what is of second order in their differences repeats too",
@@ -174,7 +174,7 @@ class SelectionCriteria:
     )
     single_bins: int = _criterion(24, "bins", "of one signal, with equal numbers of samples, follow what it does")
     pair_bins: int = _criterion(10, "bins", "of each signal of a pair, so that their square is filled")
-    least_per_bin: int = _criterion(10, "samples", "in each bin of a pair on average, or nothing is said")
+    min_per_bin: int = _criterion(10, "samples", "in each bin of a pair on average, or nothing is said")
     shrinkage: float = _criterion(
         5.0, "samples", "of zero in every bin, so that a mean over few samples counts for little"
     )
@@ -182,13 +182,13 @@ class SelectionCriteria:
         0.8, "of what the best pair explains", "one signal that explains so much is named without the other"
     )
     # Shown to be noise.
-    least_power: float = _criterion(
+    min_power: float = _criterion(
         0.3,
         "share of squared residual",
         "where half of the effects would have to remove more to be significant, nothing found says nothing",
         "docs/diagnosis.md",
     )
-    least_colour: float = _criterion(
+    min_colour: float = _criterion(
         0.25,
         "share of the residual's power",
         "above white noise within the band: more may be a motion's doing, or noise with a memory",
@@ -206,21 +206,21 @@ class SelectionCriteria:
         "of the band",
         "above it is looked for what the band's end may itself come from, an elastic joint's resonance",
     )
-    most_widenings: int = _criterion(2, "times", "bands grow no further")
+    max_widenings: int = _criterion(2, "times", "bands grow no further")
     # Effects that stand for another.
-    least_of_repeatable: float = _criterion(
+    min_of_repeatable: float = _criterion(
         0.5,
         "of what repeats",
         "where most of it stays unexplained, an effect that removes less stands for another; on recordings held out, of what its "
         "size promises",
     )
-    most_demotions: int = _criterion(3, "rounds", "for time")
+    max_demotions: int = _criterion(3, "rounds", "for time")
     # Effects that cannot be told apart.
     alike: float = _criterion(2.0, "standard errors", "errors of two models that differ by less are the same", "95 %")
     near_confounder: float = _criterion(
         0.4, "of its gain", "that another effect must remove at a grid point to be refined and compared"
     )
-    least_share: float = _criterion(
+    min_share: float = _criterion(
         0.8, "of its gain", "that another effect must remove to be compared with the best, and to be a confounder"
     )
     cancels: float = _criterion(

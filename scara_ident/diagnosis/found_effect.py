@@ -167,7 +167,7 @@ def found_effects(
                 None if candidate.corrects_data else candidate,
                 readings.get((candidate.effect.name, candidate.joint(scene)), {}),
                 held_out.get(candidate.label(scene)),
-                told_size(candidate.effect, values, found.step.criteria.least_size),
+                told_size(candidate.effect, values, found.step.criteria.min_size),
             )
         )
         before = now
@@ -190,7 +190,7 @@ def uncounted_correction(found: Search, parameters: PhysicalParameters) -> str |
         return small
     whole = parameters.coefficients[-1].covariance
     own = Coefficients(*candidate.effect.alike(value, whole))
-    stds = found.step.criteria.least_final_size
+    stds = found.step.criteria.min_final_size
     least = own.at_least(stds)
     small = candidate.effect.negligible(found.scene, candidate.member, least)
     if np.any(least) and small is None:

@@ -51,7 +51,7 @@ def select_model(task: SearchTask, observations: Observations, *, free: bool) ->
     now, left = first(task.progress)
     found, looked = search(replace(task, progress=now), CandidateColumns(observations)), False
     narrower: Search | None = None
-    for _ in range(criteria.most_widenings if free else 0):
+    for _ in range(criteria.max_widenings if free else 0):
         left("choosing the band again")
         # What was missing had hidden how far up the motion explains the torque, and other effects with it.
         explains = max(choose_bands(found.model, found.data).bands) if found.chosen else 0.0
@@ -114,7 +114,7 @@ def _promised_band(found: Search, criteria: SelectionCriteria) -> float:
         and item.candidate.effect.band(item.candidate.member) > 0.0
         and more_than_chance(item, found.tried, criteria)
         # A grid point loses the rest.
-        and item.gain >= criteria.near_best * criteria.least_gain
+        and item.gain >= criteria.near_best * criteria.min_gain
         and hopeless(item, found.scene, criteria) is None
     ]
     if not promising:
@@ -187,7 +187,7 @@ def _without_proxies(task: SearchTask, found: Outcome) -> Outcome:
     demoted: dict[str, Decision] = {}
     instead: dict[str, tuple[Candidate, Candidate]] = {}
     left = task.progress
-    for _ in range(task.criteria.most_demotions):
+    for _ in range(task.criteria.max_demotions):
         refused = [*proxies(found, task.criteria), *_unstable(found, _others(demoted, found))]
         if not refused:
             break

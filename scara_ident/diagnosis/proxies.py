@@ -73,11 +73,11 @@ def proxies(found: Outcome, criteria: SelectionCriteria) -> list[Decision]:
         removal = _removal(
             rest, dict(zip(search.base.robot.joints, zip(without, beside, strict=True), strict=True)), owner
         )
-        short = removal.removed < criteria.least_of_repeatable * removal.repeating
+        short = removal.removed < criteria.min_of_repeatable * removal.repeating
         kept = decision.label in labels
         # On a joint where nothing but what the positions' noise makes is left, no effect need remove that.
         noisy = owner is not None and owner in rest and rest[owner].of_positions > 0.0
-        excused = short and noisy and removal.removed >= criteria.least_of_repeatable * removal.beyond
+        excused = short and noisy and removal.removed >= criteria.min_of_repeatable * removal.beyond
         if short and (owner is None or owner in left) and not (excused and kept):
             share = max(0.0, removal.removed / removal.repeating) if removal.repeating > 0.0 else 0.0
             why = f"it would remove {share:.0%} of what repeats, and most of the rest stays unexplained"

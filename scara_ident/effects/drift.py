@@ -30,7 +30,7 @@ LARGEST_WARM_UP_SHARE = 3.0
 FASTEST_WARM_UP = 0.25
 # Least power of speed of what warms up, by the parts that a heated gear may lose: the grip of seals and preloaded bearings, the drag
 # of the lubricant, or both in one proportion.
-LEAST_POWER: dict[Part, float] = {"all": 0.0, "coulomb": 0.0, "viscous": 1.0}
+MIN_POWER: dict[Part, float] = {"all": 0.0, "coulomb": 0.0, "viscous": 1.0}
 # What these parts are called.
 PARTS: dict[Part, str] = {
     "all": "friction",
@@ -107,11 +107,11 @@ class WarmUp(Effect):
 
     def other_laws(self) -> tuple[Effect, ...]:
         """Return the families by which other parts of the friction warm up."""
-        return tuple(WarmUp(part) for part in LEAST_POWER if part != self.part)
+        return tuple(WarmUp(part) for part in MIN_POWER if part != self.part)
 
     def law(self) -> Mapping[str, Parameter]:
         """Return the least power of speed that warms up, where it is not friction as a whole."""
-        return {} if self.part == "all" else {"speed_power": Parameter(LEAST_POWER[self.part], 0.0, "1")}
+        return {} if self.part == "all" else {"speed_power": Parameter(MIN_POWER[self.part], 0.0, "1")}
 
     def description(self, scene: Scene, member: Member) -> str:
         """Add what of the friction warms up, where it is not the whole."""

@@ -35,7 +35,7 @@ AS_FAR_AS_MAY_BE = 0.999
 # A resonance is told from a softer gear by what is above it: the band reaches so many times its frequency.
 BOTH_SIDES = 1.5
 # Links that share less of their inertia hardly swing together.
-LEAST_COUPLING = 0.2
+MIN_COUPLING = 0.2
 # With less damping than this two gears are not fitted from a guess: the phase after a few swings would be anything.
 STEADY_DAMPING = 0.05
 # Clearances tried, rad at the joint: three times apart, which refinement bridges.
@@ -172,7 +172,7 @@ class JointElasticity(BehindGear):
         """Return joints without an elastic gear in the model whose links share much of their inertia, most of it first, and how much."""
         taken = {member.place, *(item.place for effect, item in scene.together if effect == self)}
         found = {j: usual_coupling(scene, member.place, j) for j in self.joints(scene) if j not in taken}
-        return {j: found[j] for j in sorted(found, key=lambda j: -found[j]) if found[j] > LEAST_COUPLING}
+        return {j: found[j] for j in sorted(found, key=lambda j: -found[j]) if found[j] > MIN_COUPLING}
 
     def elsewhere(self, scene: Scene, member: Member) -> tuple[Member, ...]:
         """Return a softer and a stiffer gear, as far as the frequencies that are tried are apart."""

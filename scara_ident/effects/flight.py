@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.effects.links import (
-    LEAST_INERTIA,
+    MIN_INERTIA,
     behind,
     held_link_inertia,
     lagging,
@@ -97,7 +97,7 @@ class FreeLink:
         load, inertia = -turning * motion.a[j], -turning * np.ones(motion.samples)
         load[at] += rigid_rows(self.signals)[j] / scale
         inertia[at] += self._inertia_columns
-        inertia[:, self._inertia <= LEAST_INERTIA * self.usual] = 0.0
+        inertia[:, self._inertia <= MIN_INERTIA * self.usual] = 0.0
         drifts = (load - self._drift * inertia) / self._inertia
         moved = np.zeros((len(acting), motion.samples))
         for flight in flights:

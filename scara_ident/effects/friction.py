@@ -12,7 +12,7 @@ from scara_ident.arrays import Array
 from scara_ident.effects.effect import DOUBT_STDS, Effect
 from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, Parameter, View
 from scara_ident.effects.signals import Scene, Signals
-from scara_ident.effects.sinusoid import Sinusoid, least_amplitude, sine_and_cosine
+from scara_ident.effects.sinusoid import Sinusoid, min_amplitude, sine_and_cosine
 from scara_ident.model.terms import Column, Friction
 
 # Stribeck velocities tried, as shares of the joint's largest speed; above the last-but-widest a polynomial spans it.
@@ -245,7 +245,7 @@ class PositionDependentFriction(Sinusoid):
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """Say so where friction does not brake at every position."""
         coulomb = friction_of(scene, member.place).get(0, 0.0)
-        return "friction would push at some position" if least_amplitude(value, std) > max(coulomb, 0.0) else None
+        return "friction would push at some position" if min_amplitude(value, std) > max(coulomb, 0.0) else None
 
     def parameters(self, scene: Scene, member: Member, value: Array, covariance: Array) -> Mapping[str, Parameter]:
         """Return share and phase; the share's standard deviation leaves out that of a0."""

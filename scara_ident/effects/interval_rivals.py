@@ -21,7 +21,7 @@ from scara_ident.robot.kinematics import force_torques
 # A weight that hangs from a tool that hardly turns is a constant force: one that explains less than so much more is no other.
 ALIKE = 0.05
 # Intervals that are asked at the most, those that show the body most: their columns are as many times more.
-MOST_ASKED = 12
+MAX_INTERVALS = 12
 # Twice a logarithm of odds: very strong evidence (Kass and Raftery 1995).
 STRONG = 10.0
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
-from scara_ident.effects.interval_rivals import MOST_ASKED, STRONG, Asked, beaten
+from scara_ident.effects.interval_rivals import MAX_INTERVALS, STRONG, Asked, beaten
 from scara_ident.effects.last_link_cells import Cells, cells_of
 from scara_ident.effects.parameters import Interval
 from scara_ident.effects.recording_groups import inverse_of
@@ -199,7 +199,7 @@ def _asked(cells: Cells, found: _Found) -> Asked:
         for a, b in spans(state)
     ]
     result: Asked = {}
-    for place, (_, name, start, stop) in enumerate(sorted(every, reverse=True)[:MOST_ASKED]):
+    for place, (_, name, start, stop) in enumerate(sorted(every, reverse=True)[:MAX_INTERVALS]):
         result.setdefault(name, []).append((place, float(start), float(stop)))
     return result
 

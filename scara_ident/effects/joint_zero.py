@@ -24,7 +24,7 @@ ZERO_STEP = 1e-4
 # A change that is a smaller share of the torque is what rounding leaves of none.
 ROUNDING = 1e-12
 # An offset below this, rad or m, is that of the derivative: of the difference only rounding would be left.
-LEAST_OFFSET = 1e-6
+MIN_OFFSET = 1e-6
 # An offset of half a turn is the largest there is, and a fit may come to lie a little beyond it. Of a sliding joint it is far more
 # than any, m.
 LARGEST_OFFSET = 1.1 * np.pi
@@ -113,7 +113,7 @@ class _Moved:
     @cached_property
     def change(self) -> Array:
         """Torque of all joints less that at the recorded positions, per offset, recorded side, shape (n, N)."""
-        if abs(self.offset) < LEAST_OFFSET:
+        if abs(self.offset) < MIN_OFFSET:
             return rigid_slopes(self.signals, self.joint)[0]
         return np.asarray((self._torque(self.offset) - self.signals.rigid) / self.offset)
 

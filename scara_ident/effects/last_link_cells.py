@@ -17,7 +17,7 @@ from scara_ident.effects.signals import Scene, Signals
 
 # Cells last this long at the least, s, a sixth of what is carried shortest, and there are so many in all recordings together:
 # more would tell instants better, and take more time and memory than they are worth here.
-LEAST_CELL, MOST_CELLS = 0.05, 8192
+MIN_CELL, MAX_CELLS = 0.05, 8192
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +134,7 @@ def cells_of(scene: Scene, shown: Sequence[int]) -> Cells:
     p, weights = len(scene.value), _weights(scene)
     with_motion = {motion.name for motion in scene.columns}
     lengths = {name: duration_of(scene, name) for name in scene.start if name in with_motion}
-    shortest = max(0.5 / scene.band, LEAST_CELL, sum(lengths.values()) / MOST_CELLS)
+    shortest = max(0.5 / scene.band, MIN_CELL, sum(lengths.values()) / MAX_CELLS)
     products, each = np.zeros((p, p + 1)), []
     for name, length in lengths.items():
         item, own = _recording(scene, name, shown, weights, max(1, int(length / shortest)))

@@ -29,9 +29,9 @@ POSITION_STEP = 1e-5
 # Step that differentiates it by velocity, as a share of the largest speed or 1; it is quadratic, so that any is exact.
 SPEED_STEP = 1e-4
 # A joint's inertia in its most folded pose is more than this share of its mean, or the estimate of it is a poor one.
-LEAST_FOLDED = 0.02
+MIN_FOLDED_SHARE = 0.02
 # A link's inertia stays above this share of its usual one, however folded, where the estimate is a poor one.
-LEAST_INERTIA = 0.1
+MIN_INERTIA = 0.1
 
 T = TypeVar("T")
 
@@ -331,7 +331,7 @@ def link_inertia(signals: Signals, joint: int) -> Array:
 
 def held_link_inertia(signals: Signals, joint: int) -> Array:
     """Return `link_inertia`, held above a share of the usual one, shape (N,)."""
-    return np.maximum(link_inertia(signals, joint), LEAST_INERTIA * usual_link_inertia(signals.scene, joint))
+    return np.maximum(link_inertia(signals, joint), MIN_INERTIA * usual_link_inertia(signals.scene, joint))
 
 
 def usual_link_inertia(scene: Scene, joint: int) -> float:
@@ -349,7 +349,7 @@ def largest_armature(scene: Scene, joint: int) -> float:
     """Return the armature that would leave the link no inertia in its most folded pose; infinite where misjudged."""
     moved = moved_inertia(scene, joint, joint)
     least = float(np.min(moved))
-    return least if least > LEAST_FOLDED * float(np.mean(moved)) > 0.0 else np.inf
+    return least if least > MIN_FOLDED_SHARE * float(np.mean(moved)) > 0.0 else np.inf
 
 
 def moved_inertia(scene: Scene, place: int, joint: int) -> Array:

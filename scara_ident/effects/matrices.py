@@ -7,7 +7,7 @@ import numpy as np
 from scara_ident.arrays import Array
 
 # The links' mass matrix, scaled to a diagonal of 1, has no smaller eigenvalue, however poor the estimate.
-LEAST_EIGENVALUE = 0.01
+MIN_EIGENVALUE = 0.01
 
 
 def times(matrices: Array, rows: Array, result: Array | None = None) -> Array:
@@ -47,23 +47,23 @@ def definite(inertia: Array) -> Array:
         return inertia
     size = np.sqrt(np.einsum("iin->in", inertia))
     scaled = inertia / (size[:, None] * size)
-    least = _least_eigenvalues(scaled)
-    factor = np.where(least < LEAST_EIGENVALUE, (1.0 - LEAST_EIGENVALUE) / (1.0 - np.minimum(least, 0.5)), 1.0)
+    least = _min_eigenvalues(scaled)
+    factor = np.where(least < MIN_EIGENVALUE, (1.0 - MIN_EIGENVALUE) / (1.0 - np.minimum(least, 0.5)), 1.0)
     result = inertia * factor
     for a in range(len(inertia)):
         result[a, a] = inertia[a, a]
     return np.asarray(result)
 
 
-def _least_eigenvalues(scaled: Array) -> Array:
-    """Return the smallest eigenvalues, shape (N,), of symmetric matrices (m, m, N) with a diagonal of 1; 1 for those above `LEAST_EIGENVALUE`."""
+def _min_eigenvalues(scaled: Array) -> Array:
+    """Return the smallest eigenvalues, shape (N,), of symmetric matrices (m, m, N) with a diagonal of 1; 1 for those above `MIN_EIGENVALUE`."""
     if len(scaled) == 2:
         # What the two share lies beside the diagonal.
         return np.asarray(1.0 - np.abs(scaled[1, 0]))
     # That all pivots are positive takes a tenth of the time of the eigenvalues, which few matrices need.
     left, low = scaled.copy(), np.zeros(scaled.shape[2], dtype=bool)
     for a in range(len(left)):
-        left[a, a] -= LEAST_EIGENVALUE
+        left[a, a] -= MIN_EIGENVALUE
     for a in range(len(left)):
         low |= ~(left[a, a] > 0.0)
         pivot = np.where(low, 1.0, left[a, a])

@@ -30,7 +30,7 @@ LONGEST_DELAY_SAMPLES = 5.0
 # Torque scales of one arm that differ by more than this factor, either way, are a wrong unit, not a mismatch.
 LARGEST_MISMATCH = 2.0
 # Of so few joints that share parameters either may be the one whose scale is wrong; of more, most agree.
-MOST_TO_DOUBT = 2
+MAX_AMBIGUOUS_JOINTS = 2
 # Torque that is held from one sample to the next, or averaged over one, is up to this many samples off its time stamp.
 SAMPLING = 1.0
 # Data are corrected until a further delay is below this, s.
@@ -138,13 +138,13 @@ class TorqueGainMismatch(Effect):
     def joints(self, scene: Scene) -> list[int]:
         """Return all joints whose scale another's tells; of two the second, as either explains what the other does."""
         groups = [group for group in _groups(scene) if len(group) > 1]
-        return sorted(j for group in groups for j in (group if len(group) > MOST_TO_DOUBT else group[1:]))
+        return sorted(j for group in groups for j in (group if len(group) > MAX_AMBIGUOUS_JOINTS else group[1:]))
 
     def or_else(self, scene: Scene, member: Member, value: Array) -> str:
         """Say of two joints that it may be the other one."""
         return (
             ""
-            if len(_compared(scene, member)) > MOST_TO_DOUBT
+            if len(_compared(scene, member)) > MAX_AMBIGUOUS_JOINTS
             else "; of two joints nothing tells which one's is wrong"
         )
 

@@ -16,7 +16,7 @@ from scara_ident.effects.payload import FreePayloadChange, shown_of
 from scara_ident.effects.signals import Scene, Signals
 
 # So many intervals are said in words.
-MOST_SAID = 3
+MAX_SENTENCES = 3
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class PayloadInIntervals(FreePayloadChange):
             f"{names[item.recording]} from {item.start:.2f} " + (f"to {item.stop:.2f} s" if item.stop_std else "s on")
             for item in member.intervals
         ]
-        if len(said) > MOST_SAID:
+        if len(said) > MAX_SENTENCES:
             within = dict.fromkeys(names[item.recording] for item in member.intervals)
             said = [f"{len(said)} intervals of {', '.join(within)}"]
         return super().words(scene, member) | {"intervals": "; ".join(said)}

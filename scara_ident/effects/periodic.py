@@ -15,7 +15,7 @@ from scara_ident.effects.friction import friction_places, friction_slope
 from scara_ident.effects.links import behind, rigid_slopes
 from scara_ident.effects.parameters import Member, NonlinearParameter, Parameter, SpectralLine, View
 from scara_ident.effects.signals import Scene, Signals
-from scara_ident.effects.sinusoid import Sinusoid, least_amplitude, sine_and_cosine, sines
+from scara_ident.effects.sinusoid import Sinusoid, min_amplitude, sine_and_cosine, sines
 from scara_ident.effects.spectra import HIGHEST_FREQUENCY_SHARE
 from scara_ident.model.terms import Column, joint_rows
 
@@ -107,7 +107,7 @@ class TorqueRipple(PerMotorTurn):
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """Say so where it leaves the torque limit behind."""
         limit = float(scene.robot.torque_limit[member.place])
-        return "the ripple would be larger than the torque limit" if least_amplitude(value, std) > limit else None
+        return "the ripple would be larger than the torque limit" if min_amplitude(value, std) > limit else None
 
 
 class EncoderEccentricity(PerMotorTurn):
@@ -178,7 +178,7 @@ class EncoderEccentricity(PerMotorTurn):
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """Say so where an encoder would err by much of a turn."""
         at_motor = abs(float(scene.robot.reduction[member.place])) * max(member.nonlinear[0], 1.0)
-        too_much = at_motor * least_amplitude(value, std) > LARGEST_ECCENTRICITY
+        too_much = at_motor * min_amplitude(value, std) > LARGEST_ECCENTRICITY
         return "no encoder errs by that much" if too_much else None
 
 

@@ -13,12 +13,12 @@ from scara_ident.effects.friction import friction_of, friction_places
 from scara_ident.effects.measurement import SAMPLING, TimeDelay, lacking
 from scara_ident.effects.parameters import Member, Parameter, deviation
 from scara_ident.effects.signals import Scene, Signals
-from scara_ident.estimation.run_variation import LEAST_RUNS
+from scara_ident.estimation.run_variation import MIN_RUNS
 from scara_ident.model.terms import Column
 
 # A column for each recording on the rows of all: of so many recordings as many numbers as the rigid body of six joints has.
 # Of more the delay of all is corrected alone, and that they differ is said.
-MOST_RECORDINGS = 36
+MAX_RECORDINGS = 36
 
 
 class DelayOfEachRecording(TimeDelay):
@@ -39,7 +39,7 @@ class DelayOfEachRecording(TimeDelay):
 
     def members(self, scene: Scene) -> tuple[Member, ...]:
         """Return one for all joints, of recordings that are enough to say that they differ."""
-        return (Member(None),) if LEAST_RUNS <= len(scene.start) <= MOST_RECORDINGS else ()
+        return (Member(None),) if MIN_RUNS <= len(scene.start) <= MAX_RECORDINGS else ()
 
     def columns(self, scene: Scene, member: Member) -> tuple[Column, ...]:
         """Describe the delay of each recording."""

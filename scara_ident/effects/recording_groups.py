@@ -24,7 +24,7 @@ from scara_ident.motion.motion import Motion
 # Probability that noise alone, over all ways to part the recordings, makes two groups.
 CHANCE = 0.01
 # The last groups to be joined are proposed: four payloads are told apart.
-MOST_GROUPS = 3
+MAX_GROUPS = 3
 # What one recording may have more than another, as a multiple of the arm: so weak that only what nobody excites feels it.
 WIDE = 3.0
 # Slower than this share of a joint's largest speed the direction of friction is not sure.
@@ -70,7 +70,7 @@ def groups_by_torque(scene: Scene, shown: Sequence[int], unloaded: frozenset[str
         value, covariance = _joined(value, covariance, min(one), min(other), size)
         clusters = [item for item in clusters if item not in (one, other)] + [one | other]
     found = []
-    for place in range(len(proposals) - 1, max(-1, len(proposals) - 1 - MOST_GROUPS), -1):
+    for place in range(len(proposals) - 1, max(-1, len(proposals) - 1 - MAX_GROUPS), -1):
         carrying, height = proposals[place]
         # What recordings of one group differ by beyond white noise.
         scatter = max(1.0, float(np.median([lower for _, lower in proposals[:place]] or [0.0])) / size)

@@ -26,7 +26,7 @@ from scara_ident.motion.prepared import PreparedRecording, PreparedStretch
 KNOWN = 0.99
 # A stiffness is told from this many standard deviations, where noise is at most this share of the lag's square, and the torque
 # that the gear passes on explains this share of it, which that of a clearance does not.
-LEAST_STDS, MOST_NOISE, LEAST_ALIKE = 5.0, 0.02, 0.8
+MIN_STDS, MAX_NOISE, MIN_EXPLAINED = 5.0, 0.02, 0.8
 
 
 def gear_stiffness(
@@ -106,9 +106,9 @@ def gear_stiffness(
     alike = float(np.mean(made**2)) / (float(np.mean(made**2)) + slow)
     # What of the lag no torque made, be it noise or an encoder's error that repeats, makes a gear look softer by no more than
     # the torque leaves of the lag: regressed the other way round, on the torque, the stiffness is so much larger.
-    softer = max(share, 1.0 / max(alike, LEAST_ALIKE) - 1.0)
+    softer = max(share, 1.0 / max(alike, MIN_EXPLAINED) - 1.0)
     std = float(np.hypot(np.sqrt(squares) / scale[0], softer * stiffness))
-    if share > MOST_NOISE or not alike > LEAST_ALIKE or not stiffness > LEAST_STDS * std:
+    if share > MAX_NOISE or not alike > MIN_EXPLAINED or not stiffness > MIN_STDS * std:
         return None
     return Parameter(stiffness, std, "N/m" if scene.robot.prismatic[joint] else "N m/rad")
 

@@ -60,7 +60,7 @@ class Sinusoid(Effect):
         return {self.amplitude_name: Parameter(*amplitude, unit), "phase": Parameter(*phase, "rad")}
 
 
-def least_amplitude(value: Array, std: Array) -> float:
+def min_amplitude(value: Array, std: Array) -> float:
     """Return the amplitude of a sine and a cosine less what it may be too large by."""
     return float(np.hypot(*value)) - DOUBT_STDS * float(np.max(std))
 

@@ -51,10 +51,10 @@ STEPS = 2
 # Of a smaller lag, rad or m, what is of second order is this share of its torque and is left out, which saves most of the time.
 SMALL_LAG = 5e-3
 # Gravity does not take away more than the rest of a gear's stiffness.
-LEAST_SPRING = 0.1
+MIN_STIFFNESS_SHARE = 0.1
 # Radians (of a joint that slides as much of its travel, see `Scene.radian`): a link that lags by more has no gear, whose springs
 # are wound by milliradians, by a few tenths in arms with springs on purpose. Newton's steps from there end nowhere.
-MOST_LAG = 1.0
+MAX_LAG = 1.0
 # A swing at the beginning is followed until no more than this share is left of it, and then for so many periods of the band.
 FADED, FADED_PERIODS = 1e-6, 8.0
 
@@ -135,7 +135,7 @@ class TwoMasses:
     def _swing(self, slopes: Lag) -> Swing:
         spring, damping, inertia = (part.copy() for part in slopes)
         for a, (k, d) in enumerate(zip(self.stiffness, self.damping, strict=True)):
-            spring[a, a] = np.maximum(k + spring[a, a], LEAST_SPRING * k)
+            spring[a, a] = np.maximum(k + spring[a, a], MIN_STIFFNESS_SHARE * k)
             damping[a, a] += d
         return Swing(inertia, damping, spring, 1.0 / self.signals.motion.rate)
 
@@ -151,12 +151,12 @@ class TwoMasses:
 
     @property
     def held(self) -> bool:
-        """Whether gears hold their links, see `MOST_LAG`. No arm is otherwise, and lags are NaN then."""
+        """Whether gears hold their links, see `MAX_LAG`. No arm is otherwise, and lags are NaN then."""
         return not bool(np.any(np.isnan(self.lag[0])))
 
     def _within_gears(self, lag: Lag) -> bool:
         # Not so either where they are NaN or infinite.
-        most = MOST_LAG * self.signals.scene.radian[self.joints]
+        most = MAX_LAG * self.signals.scene.radian[self.joints]
         return bool(np.all(np.max(np.abs(lag[0]), axis=1) <= most))
 
     def _made_lag(self) -> tuple[Lag, Swing, Signals | None]:

@@ -29,7 +29,7 @@ from scara_ident.threads import side_by_side, threads_for
 # a prediction, p / N of it (Seber and Lee, Linear Regression Analysis, 2003, section 12.2).
 ROWS_PER_PARAMETER = 5.0
 # A joint that hardly moves is not given more than so many times the band that all joints together need.
-MOST_ALONE = 2.0
+MAX_BAND_RATIO = 2.0
 # Independent values a second of a signal low-passed at 1 Hz (Nyquist).
 ROWS_PER_HERTZ = 2.0
 # Highest band as a share of the sample rate.
@@ -181,7 +181,7 @@ def narrowest_bands(model: TorqueModel, stretches: int, moving: Array) -> Array:
     need = ROWS_PER_PARAMETER * needed_rows(model) / ROWS_PER_HERTZ + 2.0 * END_PERIODS * stretches
     together = float(np.sum(need) / np.sum(moving))
     alone = np.divide(need, moving, out=np.full(len(need), np.inf), where=moving > 0.0)
-    return np.asarray(np.clip(alone, together, MOST_ALONE * together))
+    return np.asarray(np.clip(alone, together, MAX_BAND_RATIO * together))
 
 
 def _moving(slow: PreparedData) -> Array:

@@ -34,9 +34,9 @@ ROUNDED = 1.0 + 1e-6
 # Redundancy below which nothing is known of a joint's noise.
 NO_REDUNDANCY = 1e-9
 # Parts of a recording, at the most, whose scores are looked at over all times up to the whole of it: neighbouring blocks are one.
-MOST_PARTS = 12
+MAX_PARTS = 12
 # A variance from fewer degrees of freedom than one is not widened further.
-LEAST_FREEDOM = 1.0
+MIN_FREEDOM = 1.0
 # Blocks whose products with all parameters are made together: those of all of a long recording need not be held.
 BLOCKS_AT_ONCE = 64
 
@@ -88,7 +88,7 @@ def block_covariance(
     found = _scattered(scores, root, owner) if len(owner) >= BLOCKS_PER_PARAMETER * root.shape[1] else None
     kind = "block" if found else "pooled block"
     matrix, freedom = found or _pooled(scores, root, owner)
-    wider = widening(np.maximum(freedom, LEAST_FREEDOM))
+    wider = widening(np.maximum(freedom, MIN_FREEDOM))
     return Covariance(matrix * np.outer(wider, wider), kind, len(owner), freedom)
 
 
@@ -232,9 +232,9 @@ def _powers(scored: Array, leverages: Array, owner: NDArray[np.intp]) -> tuple[f
     between = np.zeros(leverages.shape[1:])
     for run in np.unique(owner):
         first, stop = np.searchsorted(owner, [run, run + 1])
-        bounds = np.linspace(first, stop, min(stop - first, MOST_PARTS) + 1).astype(np.intp)
+        bounds = np.linspace(first, stop, min(stop - first, MAX_PARTS) + 1).astype(np.intp)
         scores, products = scored[first:stop], leverages[first:stop]
-        if stop - first > MOST_PARTS:
+        if stop - first > MAX_PARTS:
             scores, products = (np.add.reduceat(each, bounds[:-1] - first) for each in (scores, products))
         apart = np.arange(len(scores))
         kernel = 1.0 - np.abs(apart[:, None] - apart) / len(apart)

@@ -13,13 +13,13 @@ from scara_ident.motion.motion import Motion
 from scara_ident.threads import THREADS, side_by_side
 
 # Samples at a time: enough to hide the cost of a call, and with all their columns so many numbers that the cache holds them.
-LEAST_CHUNK, MOST_CHUNK, NUMBERS = 4096, 16384, 300_000
+MIN_CHUNK, MAX_CHUNK, NUMBERS = 4096, 16384, 300_000
 
 
 def chunk_of(model: TorqueModel) -> int:
     """Return how many samples of a model are made and absorbed at a time."""
     columns = sum(len(own) + 1 for own in model.active)
-    return min(MOST_CHUNK, max(LEAST_CHUNK, NUMBERS // columns))
+    return min(MAX_CHUNK, max(MIN_CHUNK, NUMBERS // columns))
 
 
 def information_of(model: TorqueModel, motion: Motion) -> tuple[Information, ...]:

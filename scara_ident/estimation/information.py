@@ -23,7 +23,7 @@ from scara_ident.manners import Frozen
 
 # Rounds in which joints are weighted by what they leave, and the least that one may leave, as a share of its torque.
 WEIGHTING_ROUNDS = 3
-LEAST_NOISE = 1e-6
+MIN_NOISE_SHARE = 1e-6
 
 # Rows a QR takes at a time: small panels stay in cache, and LAPACK does not thread them.
 PANEL_ROWS = 512
@@ -217,7 +217,7 @@ class Information(Frozen):
 
         Rows that are `saturated` are fitted exactly whatever their noise is: it may then be as large as the torque. An exact fit of more rows would give an infinite weight; rounding is the floor.
         """
-        least = 1.0 if self.saturated else LEAST_NOISE
+        least = 1.0 if self.saturated else MIN_NOISE_SHARE
         return max(self.rms(value), least * self.torque_rms) or 1.0
 
     @property

@@ -16,7 +16,7 @@ from scara_ident.estimation.information import Information, joint_noise, merge, 
 from scara_ident.estimation.noise_bias import noise_bias
 from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.run_offsets import OffsetRows, beside_offsets, larger_offsets, offsets_on
-from scara_ident.estimation.run_variation import LEAST_RUNS, RunVariation
+from scara_ident.estimation.run_variation import MIN_RUNS, RunVariation
 from scara_ident.estimation.variation_between import run_variation
 from scara_ident.estimation.working_range import Told, told_directions
 from scara_ident.threads import one_blas_thread, side_by_side
@@ -171,7 +171,7 @@ def least_squares(
         spread = block_covariance(fit.inverse, fit.value, rows.influence.joints, observations.owner, fit.weights)
     differing = variation if least is None else larger_offsets(variation.offsets, least) or least
     covariance = spread.matrix + differing.covariance(fit.inverse, rows.influence.joints, fit.weights)
-    if len(observations.data.recordings) < LEAST_RUNS:
+    if len(observations.data.recordings) < MIN_RUNS:
         # What else two runs might differ by is not told.
         variation = variation.offsets or RunVariation((None,) * len(observations.joints))
     bias = None

@@ -33,7 +33,7 @@ HUBER_ROUNDS, TUKEY_ROUNDS = 4, 3
 # Rows for each direction that acts on a joint, beyond which its residual is its noise.
 ROWS = 2
 # Blocks of a joint: of long recordings, neighbours are one.
-MOST_BLOCKS = 400
+MAX_BLOCKS = 400
 # Names that a note lists.
 LISTED = 4
 
@@ -143,7 +143,7 @@ def _sums(rows: JointRows, factor: Array, root: Array) -> _Sums:
     together = np.empty((own_root.shape[1] + 1, rows.table.shape[1]))
     np.matmul(own_root.T, rows.table[:-1], out=together[:-1])
     together[-1] = rows.table[-1]
-    bounds = rows.starts[:: max(1, -(-len(rows.counts) // MOST_BLOCKS))]
+    bounds = rows.starts[:: max(1, -(-len(rows.counts) // MAX_BLOCKS))]
     bounds = bounds if bounds[-1] == rows.starts[-1] else np.append(bounds, rows.starts[-1])
     products = block_products(together, bounds)
     return _Sums(

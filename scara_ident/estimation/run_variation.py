@@ -39,7 +39,7 @@ LIKE_DELAY = "like a delay"
 _DIFFERING = (*(f"its {kind}" for kind in KINDS[:DELAY]), "what looks like a delay, which the joints do not share,")
 
 # With fewer recordings than this none can be told from the parameters.
-LEAST_RUNS = 3
+MIN_RUNS = 3
 # Of differences below this share of the torque nothing is said in words.
 SPOKEN_OF = 0.01
 # Delays of runs whose mean is so many of their standard deviations are one delay: no parameter takes up their mean.

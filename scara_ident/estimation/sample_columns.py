@@ -15,7 +15,7 @@ from scara_ident.motion.prepared import PreparedData, PreparedRecording
 Raw = tuple[Array, ...]
 # Samples times joints whose columns are held: they take 0.2 kB each of a six-joint arm, and a diagnosis of them 1.2 kB, which is
 # 0.6 and 3 GB (benchmarks/many_logs.py).
-MOST_VALUES = 2_400_000
+MAX_VALUES = 2_400_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,4 +58,4 @@ def evenly(count: int, number: int) -> list[int]:
 
 def few_enough(data: PreparedData) -> bool:
     """Whether the columns of data at every sample are held."""
-    return sum(part.samples for part in data.stretches) * len(data.bands) <= MOST_VALUES
+    return sum(part.samples for part in data.stretches) * len(data.bands) <= MAX_VALUES

@@ -22,7 +22,7 @@ from scara_ident.arrays import Array
 # Probability below which chance does not make pooled delays differ, as `scara_ident.estimation.variance_components.CHANCE`.
 CHANCE = 0.01
 # Share of its own squares that a delay must have left beside other kinds of difference, or rounding is taken for it.
-LEAST_LEFT = 1e-6
+MIN_INDEPENDENT_SHARE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,7 +140,7 @@ def _of_each(products: Array, aims: Array, priors: Array, units: Array, kind: in
             inner = np.linalg.pinv(own[np.ix_(beside, beside)] + known, hermitian=True)
             reach = own[kind, beside] @ inner
             left = own[kind, kind] - reach @ own[beside, kind]
-            if left > LEAST_LEFT * own[kind, kind]:
+            if left > MIN_INDEPENDENT_SHARE * own[kind, kind]:
                 late[joint, run] = units[joint] * (aim[kind] - reach @ aim[beside]) / left
                 precision[joint, run] = left / units[joint] ** 2
     return late, precision

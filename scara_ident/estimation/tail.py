@@ -19,7 +19,7 @@ from scara_ident.arrays import Array
 # Exceedances closer than this, s, are one cluster, and one alarm.
 TOGETHER = 0.5
 # Clusters that the tail is fitted to, if there are as many: a share of the seconds recorded, within bounds.
-CLUSTER_SHARE, LEAST_CLUSTERS, MOST_CLUSTERS = 0.1, 20, 400
+CLUSTER_SHARE, MIN_CLUSTERS, MAX_CLUSTERS = 0.1, 20, 400
 # Levels that are tried for that.
 LEVELS = 30
 # There must be so many clusters for each that the stated rate makes: the level is looked for above where the tail begins.
@@ -29,7 +29,7 @@ CLUSTERS_OVER_RATE = 2.0
 SHAPES, WIDTHS = np.linspace(-1.0, 0.5, 30), np.linspace(-5.0, 5.0, 31)
 PRIOR = 0.2
 # Laws less likely than this against all others are left out.
-LEAST_WEIGHT = 1e-6
+MIN_WEIGHT = 1e-6
 # Share of a level to which it is found.
 PRECISION = 1e-10
 HOUR = 3600.0
@@ -101,7 +101,7 @@ def fit_tail(times: Sequence[Array], scores: Sequence[Array], seconds: float, ra
         Per hour, that a level is looked for at.
     """
     wanted = max(
-        float(np.clip(CLUSTER_SHARE * seconds, LEAST_CLUSTERS, MOST_CLUSTERS)),
+        float(np.clip(CLUSTER_SHARE * seconds, MIN_CLUSTERS, MAX_CLUSTERS)),
         CLUSTERS_OVER_RATE * rate * seconds / HOUR,
     )
     # One after the other, far enough apart for no cluster to be of two.
@@ -153,7 +153,7 @@ def _laws(above: Array, censored: int, prior: float) -> tuple[Array, Array, Arra
     log = -count * np.log(width) - np.sum(reach[:, :count], axis=1) - np.sum(reach, axis=1) / shape
     log -= 0.5 * (shape / prior) ** 2
     weight = np.exp(log - np.max(log))
-    kept = weight > LEAST_WEIGHT * np.sum(weight)
+    kept = weight > MIN_WEIGHT * np.sum(weight)
     return width[kept], shape[kept], weight[kept] / np.sum(weight[kept])
 
 

@@ -16,7 +16,7 @@ from scara_ident.model.urdf_values import urdf_values
 from scara_ident.robot.robot import Robot
 
 # The URDF's torque tells the scale of a joint where it leaves less than this share of the identified bodies' torque.
-MOST_LEFT = 0.5
+MAX_UNEXPLAINED = 0.5
 # A scale is told where it is so many of its standard deviations.
 SURE = 5.0
 # Torques of gravity below this, N m for each kg, are rounding.
@@ -68,13 +68,13 @@ def urdf_scale(estimate: Estimate, observations: Observations) -> dict[str, floa
         torque is not that of the URDF in any scale.
     """
     each = joint_scales(estimate, observations)
-    return {joint: own.scale for joint, own in each.items() if own.told and own.left < MOST_LEFT}
+    return {joint: own.scale for joint, own in each.items() if own.told and own.left < MAX_UNEXPLAINED}
 
 
 def unlike_urdf(estimate: Estimate, observations: Observations) -> tuple[str, ...]:
     """Return the joints whose identified bodies surely take another torque than the URDF's in any scale."""
     each = joint_scales(estimate, observations)
-    return tuple(joint for joint, own in each.items() if own.sure and not own.left < MOST_LEFT)
+    return tuple(joint for joint, own in each.items() if own.sure and not own.left < MAX_UNEXPLAINED)
 
 
 def joint_scales(estimate: Estimate, observations: Observations) -> dict[str, JointScale]:

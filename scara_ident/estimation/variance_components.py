@@ -36,7 +36,7 @@ def differing(products: Array, aims: Array, kept: NDArray[np.bool_], draws: Arra
     kinds = kept.shape[1]
     # Every set of kinds that may be left, in the same steps: bit k of its place says whether kind k is in it.
     sets = (np.arange(2**kinds)[:, None] >> np.arange(kinds)) & 1 == 1
-    variances, likelihoods = _most_likely(products, aims, kept[:, None] & sets, draws)
+    variances, likelihoods = _max_likely(products, aims, kept[:, None] & sets, draws)
     found = np.zeros(kept.shape, dtype=bool)
     for joint, own in enumerate(kept):
         place = int(np.sum(1 << np.flatnonzero(own)))
@@ -58,7 +58,7 @@ def components(products: Array, aims: Array, kept: NDArray[np.bool_], draws: Arr
     products, aims, kept, draws
         See `differing`.
     """
-    return _most_likely(products, aims, kept[:, None], draws)[0][:, 0] if np.any(kept) else np.zeros(kept.shape)
+    return _max_likely(products, aims, kept[:, None], draws)[0][:, 0] if np.any(kept) else np.zeros(kept.shape)
 
 
 def expected(products: Array, aims: Array, variance: Array) -> tuple[Array, Array]:
@@ -115,7 +115,7 @@ def _inverted(matrices: Array) -> Array:
     return matrices
 
 
-def _most_likely(products: Array, aims: Array, active: NDArray[np.bool_], draws: Array) -> tuple[Array, Array]:
+def _max_likely(products: Array, aims: Array, active: NDArray[np.bool_], draws: Array) -> tuple[Array, Array]:
     """Return the variances that are most likely, and the logarithm of their likelihood, for sets of active kinds.
 
     Parameters

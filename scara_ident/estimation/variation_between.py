@@ -18,7 +18,7 @@ from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.run_variation import (
     DELAY,
     KINDS,
-    LEAST_RUNS,
+    MIN_RUNS,
     OFFSET,
     RANK,
     SCALE,
@@ -61,7 +61,7 @@ def run_variation(
         Whether the offsets of two runs are told too: by two, other differences may be the parameters'.
     """
     runs = len(observations.data.recordings)
-    if runs < (2 if of_two else LEAST_RUNS):
+    if runs < (2 if of_two else MIN_RUNS):
         return RunVariation((None,) * len(joints))
     firsts = np.searchsorted(observations.owner, np.arange(runs + 1))
     found = variation_between(observations, joints, value, firsts, taken=taken)
@@ -214,7 +214,7 @@ def _estimated(joints: Sequence[_Sums], taken: Sequence[float]) -> list[JointVar
     products, aims = np.array([item.products for item in joints]), np.array([item.aims for item in joints])
     runs = aims.shape[1]
     told = np.array([item.back > 0.0 for item in joints])
-    if runs < LEAST_RUNS:
+    if runs < MIN_RUNS:
         told &= np.arange(len(KINDS)) == OFFSET
     # Parameters are fitted to all runs, so that these lie about their own mean.
     draws = np.full(told.shape, runs - 1.0)

@@ -29,7 +29,7 @@ from scara_ident.motion.motion import Motion
 # The drive's torque is so many standard deviations of what is known without data.
 SURE = 3.0
 # How many times the friction recorded each of its terms may be, anywhere in the range: one standard deviation.
-MOST_FRICTION = 2.0
+MAX_FRICTION_RATIO = 2.0
 # Random states per parameter that stand for the range.
 STATES_PER_PARAMETER = 8
 # An open share of a parameter's variance, as it is known without data, above which the parameter is called undetermined.
@@ -142,7 +142,7 @@ def believable(observations: Observations, value: Array, noise: Array) -> Array:
         size = float(np.sqrt(rubbed @ rubbed / max(own.samples, 1.0)))
         if size > 0.0:
             most = np.max(np.abs(torque), axis=0) * np.sqrt(rows.shape[1])
-            known.append(np.diag(rubbing * most / (MOST_FRICTION * size)))
+            known.append(np.diag(rubbing * most / (MAX_FRICTION_RATIO * size)))
     before = np.vstack(known) / np.sqrt(rows.shape[1])
     wanted = np.concatenate([data @ value, before @ aim])
     found = np.asarray(np.linalg.lstsq(np.vstack([data, before]), wanted, rcond=None)[0])

@@ -23,7 +23,7 @@ NEARLY = 0.95
 # Least share of the foreseen decrease that a step must give (Armijo).
 SUFFICIENT = 1e-4
 HALVINGS = 8
-LEAST_DAMPING, MOST_DAMPING = 1e-6, 1e12
+MIN_DAMPING, MAX_DAMPING = 1e-6, 1e12
 # How far multipliers may be from what the barrier alone says.
 MULTIPLIER_RANGE = 1e3
 
@@ -153,7 +153,7 @@ class _Direction:
         merit = self.point.cost - mu * np.sum(np.log(slack))
         diagonal = np.arange(matrix.shape[1])
         scale = np.mean(matrix[:, diagonal, diagonal])
-        while damping <= MOST_DAMPING:
+        while damping <= MAX_DAMPING:
             damped = matrix.copy()
             damped[:, diagonal, diagonal] += damping
             try:
@@ -175,7 +175,7 @@ class _Direction:
                     held = np.clip(wanted, usual / MULTIPLIER_RANGE, usual * MULTIPLIER_RANGE)
                     # A step that had to be halved was so many times too long.
                     eased: float = damping * (0.3 if halving == 0 else 2.0**halving)
-                    return _Step(there, room, held, max(eased, LEAST_DAMPING), slope)
+                    return _Step(there, room, held, max(eased, MIN_DAMPING), slope)
                 length *= 0.5
             damping *= 10.0
         return None

@@ -30,7 +30,7 @@ SHARE, CLEARANCE = 0.8, 0.01
 # A posture at rest must leave this share of every limit to move in.
 ROOM = 0.02
 # A joint of a smaller range, which is that of a lock, shows nothing.
-LEAST_RANGE = {"rad": 1e-3, "m": 1e-5}
+MIN_RANGE = {"rad": 1e-3, "m": 1e-5}
 
 
 class InfeasibleLimits(ScaraIdentError):
@@ -158,7 +158,7 @@ def limits_of(
     _check_stated(robot, lower, upper, velocity)
     for joint, name in enumerate(robot.joints):
         unit = robot.position_unit(joint)
-        if not upper[joint] - lower[joint] > LEAST_RANGE[unit]:
+        if not upper[joint] - lower[joint] > MIN_RANGE[unit]:
             raise RobotError(
                 f"{robot.urdf}: joint {name!r} cannot move: its range is {lower[joint]:g}..{upper[joint]:g} {unit}; "
                 "correct the URDF, give a wider range, or lock the joint"

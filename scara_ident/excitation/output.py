@@ -28,9 +28,9 @@ RATE = 1000.0
 ROS_RATE = 100.0
 ROS_POINTS = 10.0
 # Samples per period of the highest harmonic below which a table no longer tells the motion.
-LEAST_SAMPLES = 4.0
+MIN_SAMPLES = 4.0
 # Joints or limits that a sentence names, at the most.
-MOST_NAMES = 6
+MAX_NAMES = 6
 # Motion above this frequency makes most arms swing, Hz.
 SWINGING = 5.0
 # Samples per second at which the torque of guessed rotors is looked at: an order of magnitude needs no more.
@@ -92,7 +92,7 @@ def check_rate(rate: float, bandwidth: float) -> None:
     UsageError
         In one line.
     """
-    least = LEAST_SAMPLES * bandwidth
+    least = MIN_SAMPLES * bandwidth
     if not rate >= least:
         raise UsageError(
             f"rate {rate:g} Hz: this motion reaches {bandwidth:g} Hz and needs at least {least:g} Hz; "
@@ -245,7 +245,7 @@ def summary(design: Design) -> list[str]:
 
 def _few(names: Sequence[str], noun: str) -> str:
     """Return names, or how many there are where nobody would read them all."""
-    return ", ".join(names) if len(names) <= MOST_NAMES else f"{len(names)} {noun}s"
+    return ", ".join(names) if len(names) <= MAX_NAMES else f"{len(names)} {noun}s"
 
 
 def _listed(numbers: Sequence[float]) -> str:

@@ -14,7 +14,7 @@ from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.effects import Parameter, Scene, Signals
 from scara_ident.inquiry.answerability import Inquiry
 from scara_ident.inquiry.belief import Blocks, believed, known_blocks
-from scara_ident.inquiry.questions import MOST_NAMED, Question, Suspect
+from scara_ident.inquiry.questions import MAX_NAMED, Question, Suspect
 from scara_ident.manners import listed
 from scara_ident.motion.motion import Motion
 from scara_ident.motion.prepared import block_seconds
@@ -89,7 +89,7 @@ class Told:
         said = f"{self.before:.2g} standard errors apart so far, {self.after:.2g} expected with it."
         least = [f"{item.suspect.label}, {_size(item.limit)}" for item in self.shown if item.limit]
         if least:
-            said += f" The least that would be found: {'; '.join(least[:MOST_NAMED])}."
+            said += f" The least that would be found: {'; '.join(least[:MAX_NAMED])}."
         return f"{said} {self.instead}".rstrip()
 
     @property
@@ -97,13 +97,13 @@ class Told:
         """Say what the motion does not tell, and what would; nothing where it tells all."""
         if self.settled:
             return ""
-        which = listed([item.label for item in self.hidden], MOST_NAMED) or self.question.text
+        which = listed([item.label for item in self.hidden], MAX_NAMED) or self.question.text
         return f"Would not tell: {which}. What would: {self.remedy}."
 
     @property
     def remedy(self) -> str:
         """Say what tells what the motion does not; of several effects the experiment of each, of the first few."""
-        unshown = self.hidden[:MOST_NAMED]
+        unshown = self.hidden[:MAX_NAMED]
         experiments = dict.fromkeys(item.candidate.effect.experiment for item in unshown)
         return "; ".join(experiments) if len(self.question.suspects) > 1 and unshown else self.question.experiment
 

@@ -25,9 +25,9 @@ COARSE, FINE = 12, 48
 # Distances are measured at every so many-th of them.
 SPARSE = {COARSE: 2, FINE: 1}
 # At least, in the search; the winner has as many more as above.
-LEAST_TIMES = 60
+MIN_TIMES = 60
 # Times of the verification per time of the winner's limits, and at least per second.
-FINER, LEAST_RATE = 10, 1000.0
+FINER, MIN_RATE = 10, 1000.0
 # Bounds of the search, and of the winner for what happens between its times, as shares; and what a bound is tightened by
 # besides its excess.
 BOUND, CLOSE, MARGIN = 0.999, 0.998, 5e-4
@@ -156,7 +156,7 @@ def _rows(task: Task) -> int:
 def within_grid(task: Task, density: int, bounds: Array) -> Problem:
     """Return a task on so many times per period of its highest frequency."""
     periods = max(basis.bandwidth * basis.duration for basis in task.bases)
-    times = max(LEAST_TIMES * density // COARSE, int(np.ceil(density * periods)))
+    times = max(MIN_TIMES * density // COARSE, int(np.ceil(density * periods)))
     return Problem(task, grid(task.bases, times), bounds, SPARSE[density])
 
 
@@ -220,7 +220,7 @@ def verified_inside(problem: Problem, x: Array) -> tuple[Array, int]:
 
 def _verified_times(problem: Problem) -> int:
     longest = max(basis.duration for basis in problem.task.bases)
-    return max(FINER * int(problem.rows.shape[2]), int(np.ceil(LEAST_RATE * longest))) + 1
+    return max(FINER * int(problem.rows.shape[2]), int(np.ceil(MIN_RATE * longest))) + 1
 
 
 def _excess(task: Task, x: Array, times: int) -> Array:

@@ -13,13 +13,13 @@ SAMPLES = 2500
 # Highest frequency of a motion by default, Hz: controllers still follow it and arms do not yet swing.
 HIGHEST_FREQUENCY = 1.6
 # Coefficients that a search handles quickly, and at all: its time grows with their cube.
-MANY_COEFFICIENTS, MOST_COEFFICIENTS = 160, 600
+MANY_COEFFICIENTS, MAX_COEFFICIENTS = 160, 600
 # Samples per period of the highest harmonic that the criterion needs.
-LEAST_PER_PERIOD = 4
+MIN_PER_PERIOD = 4
 # A shorter motion has at least so many harmonics.
 FEWEST = 5
 # They are told apart by a letter.
-MOST_TRAJECTORIES = 26
+MAX_TRAJECTORIES = 26
 
 
 def default_harmonics(duration: float, joints: int, trajectories: int = 1) -> int:
@@ -48,8 +48,8 @@ def durations_of(duration: float | Sequence[float], trajectories: int = 1) -> tu
         if not 0.0 < each < np.inf:
             raise UsageError(f"duration {each:g} s: expected a positive number of seconds")
     wanted = trajectories if len(given) == 1 else min(trajectories, 1) * len(given)
-    if not 1 <= wanted <= MOST_TRAJECTORIES:
-        raise UsageError(f"trajectories {wanted}: expected at least 1 and at most {MOST_TRAJECTORIES}")
+    if not 1 <= wanted <= MAX_TRAJECTORIES:
+        raise UsageError(f"trajectories {wanted}: expected at least 1 and at most {MAX_TRAJECTORIES}")
     if len(given) == 1:
         return given * trajectories
     if not given or trajectories not in (1, len(given)):
@@ -75,15 +75,15 @@ def check_size(chosen: int | Sequence[int], joints: int, trajectories: int, samp
     UsageError
         In one line.
     """
-    most = max(5, MOST_COEFFICIENTS // (2 * joints * trajectories))
+    most = max(5, MAX_COEFFICIENTS // (2 * joints * trajectories))
     harmonics, highest = (chosen, chosen) if isinstance(chosen, int) else (len(chosen), max(chosen, default=0))
     if harmonics > most:
         few = "" if trajectories == 1 else ", or fewer trajectories"
         raise UsageError(
             f"harmonics {harmonics}: more than a search over {joints} joints can handle; use at most {most}{few}"
         )
-    if LEAST_PER_PERIOD * highest > samples:
+    if MIN_PER_PERIOD * highest > samples:
         raise UsageError(
             f"harmonic {highest}: {samples} samples cannot tell so fast a motion; use at most "
-            f"{samples // LEAST_PER_PERIOD}, or more samples"
+            f"{samples // MIN_PER_PERIOD}, or more samples"
         )

@@ -20,7 +20,7 @@ from scara_ident.robot.robot import Robot
 # Noise of a torque is given as its rms below this frequency, Hz.
 NOISE_BAND = 50.0
 # Most recordings of every motion that are worth naming.
-MOST_REPETITIONS = 1000
+MAX_REPETITIONS = 1000
 
 
 @dataclass(frozen=True)
@@ -145,12 +145,12 @@ def stopping(design: Design, asked: Mapping[str, float], not_judged: Sequence[st
         return farthest(total, 0, 0.0).share <= 1.0
 
     low, high = (0, 1) if design.prior is None else (-1, 0)
-    while high <= MOST_REPETITIONS and not enough(high):
+    while high <= MAX_REPETITIONS and not enough(high):
         low, high = high, max(1, 2 * high)
     while high - low > 1:
         middle = (low + high) // 2
         low, high = (low, middle) if enough(middle) else (middle, high)
-    return Stopping(tuple(after), high if high <= MOST_REPETITIONS else None, tuple(not_judged))
+    return Stopping(tuple(after), high if high <= MAX_REPETITIONS else None, tuple(not_judged))
 
 
 def asked_std(words: Sequence[str], values: Mapping[str, float]) -> tuple[dict[str, float], tuple[str, ...]]:

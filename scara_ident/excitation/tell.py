@@ -46,7 +46,7 @@ PACES = (1.0, 0.3, 0.1)
 # root, so that one in five helps (Rechenberg 1973), and is at least so large.
 FIRST, GROWN, LEAST = 0.3, 1.5, 0.01
 # What a motion that breaks a limit shrinks by at first, twice as much each time up to the most, and how often.
-SHRINKING, MOST_SHRINKING, TRIES = 0.01, 0.2, 40
+SHRINKING, MAX_SHRINKING, TRIES = 0.01, 0.2, 40
 
 
 def search_to_tell(
@@ -245,5 +245,5 @@ def _inside(problem: Problem, x: Array) -> Array | None:
     for k in range(TRIES):
         if problem.inside(x):
             return x
-        x = (1.0 - min(MOST_SHRINKING, SHRINKING * 2.0**k)) * x
+        x = (1.0 - min(MAX_SHRINKING, SHRINKING * 2.0**k)) * x
     return None

@@ -29,11 +29,11 @@ from scara_ident.fleet.scatter import LEFT_SHARE, Scatter, inverses_by_size
 # Chance that a report names any arm of a fleet in which nothing changed, and share of the arms named that are wrong on average.
 LEVEL = 0.02
 # Causes named of one arm, and the probability up from which what one explains more than another is chance.
-MOST_CAUSES = 3
+MAX_CAUSES = 3
 AS_GOOD = 0.05
 # The model leaves a share of a joint's torque unexplained, and so of what another change moves: what moves by no more than so many
 # times that share may be this. Of a payload of 0.8 kg there was left what looked like a ripple of 11 standard deviations.
-LEAST_BESIDE = 2.0
+MIN_OVER_UNEXPLAINED = 2.0
 # Draws of noise that say how many independent tests an arm's are worth, and the probability at which they do.
 SIMULATED, SIMULATED_LEVEL = 2000, 0.1
 # The median of fewer differences between dates does not withstand one that is a change: what differs by nature is then taken
@@ -97,7 +97,7 @@ def find_changes(history: History, scatter: Scatter, tried: float) -> tuple[Chan
         return ()
     search = first = _search(history, scatter)
     found: list[_Named] = []
-    for _ in range(MOST_CAUSES):
+    for _ in range(MAX_CAUSES):
         unknown = _left_of_others(history, first, [item.beside for item in found])
         ordered = search.in_order(history.causes)
         trials = [trial for trial in ordered if np.any(_moved(history, first, trial) > unknown)]
@@ -154,7 +154,7 @@ def _left_of_others(history: History, first: _Search, found: Sequence[_Trial]) -
     """Return what changes that were found may leave over as the model is not exact, as `_moved`."""
     moved = sum((_moved(history, first, trial) for trial in found), np.zeros(history.model.robot.n))
     share = np.max([np.nan_to_num(visit.error) for visit in history.visits], axis=0)
-    return np.asarray((LEAST_BESIDE * share) ** 2 * moved)
+    return np.asarray((MIN_OVER_UNEXPLAINED * share) ** 2 * moved)
 
 
 def arms_counted(probabilities: Sequence[float]) -> float:
@@ -171,7 +171,7 @@ def arms_counted(probabilities: Sequence[float]) -> float:
     return count / float(ranks[named[-1]] if len(named) else 1)
 
 
-def least_probability(history: History, scatter: Scatter, tried: float) -> float:
+def min_probability(history: History, scatter: Scatter, tried: float) -> float:
     """Return the probability of the surest change of an arm, corrected for what was tried on it."""
     trials = _search(history, scatter).in_order(history.causes)
     return min(1.0, tried * trials[0].p_value) if trials else 1.0

@@ -25,7 +25,7 @@ Result = TypeVar("Result")
 NO_WORKER_SECONDS = 60.0
 LOOK_SECONDS = 2.0
 # A piece of work that so many workers and one more died on is given up.
-MOST_DEATHS = 3
+MAX_DEATHS = 3
 CONNECT_SECONDS = "10s"
 # Variables that Dask gives processes beside those of its configuration.
 BESIDE = ("PYTHONHASHSEED", "__DASK_PARENT_PID")
@@ -127,7 +127,7 @@ def started(scheduler: str | None = None, workers: int | None = None) -> Iterato
     except ImportError:
         raise UsageError(f"fleet: its engine, dask.distributed, is missing; {INSTALL}") from None
     quiet = {
-        "distributed.scheduler.allowed-failures": MOST_DEATHS,
+        "distributed.scheduler.allowed-failures": MAX_DEATHS,
         "distributed.comm.timeouts.connect": CONNECT_SECONDS,
         # Work may start a process of its own, which a daemon may not.
         "distributed.worker.daemon": False,
@@ -252,7 +252,7 @@ def _outcome(future: Future[Any]) -> Any:
         return future.result()
     except KilledWorker:
         return ProcessEnded(
-            f"{MOST_DEATHS + 1} workers died on it, as on a file that is damaged or where memory runs out; `scara-ident identify` "
+            f"{MAX_DEATHS + 1} workers died on it, as on a file that is damaged or where memory runs out; `scara-ident identify` "
             "on its recordings names such a file"
         )
     except Exception as error:

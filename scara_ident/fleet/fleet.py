@@ -17,7 +17,7 @@ from scara_ident.fleet.changes import (
     arms_counted,
     find_changes,
     grown_residuals,
-    least_probability,
+    min_probability,
     residual_scatter,
     trials_of,
 )
@@ -211,7 +211,7 @@ def changes_of(histories: Sequence[History]) -> dict[str, tuple[Change, ...]]:
         # Arms with as many dates are tried as often.
         trials = {len(item.dates): item for item in compared}
         tried = {count: trials_of(item, scatter) for count, item in trials.items()}
-        least = [least_probability(item, scatter, tried[len(item.dates)]) for item in compared]
+        least = [min_probability(item, scatter, tried[len(item.dates)]) for item in compared]
         arms, residuals = arms_counted(least), residual_scatter(compared)
         found = {}
         for item, probability in zip(compared, least, strict=True):

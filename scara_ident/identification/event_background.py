@@ -16,11 +16,11 @@ LOOSE = 40.0
 SLOWER = (0.03, 0.08, 0.2)
 # Functions of the state taken off at the most, the share of the squared residual that one removes at the least, what harm
 # counts against gain, and standard deviations beyond which a bin's weight falls.
-MOST_FEATURES, LEAST_GAIN, HARM, INFLUENCE = 6, 0.02, 0.5, 10.0
+MAX_FEATURES, MIN_GAIN, HARM, INFLUENCE = 6, 0.02, 0.5, 10.0
 # Share of a whole sum that is nothing but its rounding, where all of it is taken off again.
 NOTHING = 1e-9
 # A trend is fitted to one of so many bins, of which there are so many for each of its columns, in so many rounds.
-THIN, LEAST_BINS, ROUNDS = 2, 10, 7
+THIN, MIN_BINS, ROUNDS = 2, 10, 7
 # Numbers in the columns of the trends that are fitted together: more would leave the cache.
 TOGETHER = 2**15
 # Starts of that fit, and standard deviations at which Tukey's loss gives up when it chooses among what they end in: half of all may
@@ -74,7 +74,7 @@ def _columns_of_trend(own: Sequence[Binned]) -> tuple[Array, Array, NDArray[np.b
 
 def _robust_trends(whole: Array, left: Array, known: NDArray[np.bool_]) -> Array:
     """Return what columns (b, k, M) explain of residuals (b, M) by Tukey's weights of bins; nothing where there is too little."""
-    trends, least = np.zeros_like(left), LEAST_BINS * whole.shape[1]
+    trends, least = np.zeros_like(left), MIN_BINS * whole.shape[1]
     enough = np.count_nonzero(known[:, ::THIN], axis=1) >= least
     if not np.any(enough):
         return trends
@@ -185,7 +185,7 @@ def _of_others(
     taken, chosen = np.zeros_like(left), list[int]()
     counts = np.diff(np.append(starts, len(left)))
     lengths = np.diff(np.append(starts[firsts], len(left)))
-    for _ in range(MOST_FEATURES):
+    for _ in range(MAX_FEATURES):
         off = left - taken
         most = INFLUENCE * NORMAL * median(np.abs(off[known]))
         use = known * (most / np.maximum(np.abs(off), most or 1.0))
@@ -197,7 +197,7 @@ def _of_others(
         # Where it does harm to one recording it is not that recording's doing.
         gains[gains < 0.0] *= HARM
         best = int(np.argmax(np.sum(gains, axis=1)))
-        if best in chosen or np.sum(gains[best]) < LEAST_GAIN * np.sum(use * off**2):
+        if best in chosen or np.sum(gains[best]) < MIN_GAIN * np.sum(use * off**2):
             break
         chosen.append(best)
         own = columns[chosen]

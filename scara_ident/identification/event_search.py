@@ -24,7 +24,7 @@ from scara_ident.identification.event_ends import GAP, Ends, event_ends
 # Lengths of the windows, s.
 WINDOWS = (0.16, 0.32, 0.6, 1.2, 2.0)
 # Windows that a scale is taken from at the least, and seconds that the largest are.
-LEAST_WINDOWS, LEAST_SECONDS = 20, 5
+MIN_WINDOWS, MIN_SECONDS = 20, 5
 # Noise makes at most one false event in so many seconds; of what a model lacks there are more, and one in 10 h is too many.
 FALSE_EVERY = 360_000.0
 # The law is of the largest of so many seconds, or of that share of all if that is more, and of no more than half of them.
@@ -35,7 +35,7 @@ EVENT_SECONDS, EVENTS_SHARE, BESIDE_EVENTS, TOPS_PER_EVENT = 5, 0.15, 1.5, 3
 # Standard deviation of the tail's shape before anything is seen: what a model lacks makes it heavier than exponential.
 SHAPE = 0.1
 # Least rms of an event in standard deviations of a bin, and the share of it that least squares leave too.
-LEAST_SIZE, LEAST_BEFORE = 2.0, 0.5
+MIN_SIZE, MIN_EVENT_SHARE = 2.0, 0.5
 # What lasts longer than this, s, and than this share of its recording is a change of the arm. What does not stand out surely is
 # seen for so long, s, before and after it within the other, and so is what is nearer to the ends of a recording than that: how
 # an arm starts and stops is no event.
@@ -49,7 +49,7 @@ RARE = 0.2
 # A joint helps to find the ends of an event if it stands out by this share of what would make it one.
 AT_ENDS = 0.45
 # Events looked for in a stretch.
-MOST_IN_STRETCH = 12
+MAX_EVENTS_PER_STRETCH = 12
 
 
 Shape = Callable[[Binned, int, int], Array | None]
@@ -115,7 +115,7 @@ def standing_out(
         novel, usual = list[Segment](), list[Segment]()
         for segment in _segments(item, scores[k], sigma, slow, shape):
             size, before = _sizes(item, [other[k] for other in others], segment)
-            large = (size > LEAST_SIZE * sigma) & (before > LEAST_BEFORE * size)
+            large = (size > MIN_SIZE * sigma) & (before > MIN_EVENT_SHARE * size)
             shown = large & (segment.score >= 1.0)
             if np.any(shown) and _local(segment):
                 (novel if _novel(segment, stretches, shown) else usual).append(segment)
@@ -233,7 +233,7 @@ def _median(means: Sequence[Array]) -> Array:
     found = np.zeros(len(together))
     for j, row in enumerate(together):
         known = row[np.isfinite(row)]
-        found[j] = NORMAL * median(known) if len(known) >= LEAST_WINDOWS else np.nan
+        found[j] = NORMAL * median(known) if len(known) >= MIN_WINDOWS else np.nan
     return np.nan_to_num(found, nan=0.0)
 
 
@@ -254,7 +254,7 @@ def _by_second(item: Binned, scores: Sequence[tuple[int, Array]]) -> Array:
 def _limit(tops: Array, joints: int) -> float:
     """Return the score that the largest of a second exceeds on any joint once in `FALSE_EVERY`."""
     square = tops[np.isfinite(tops)] ** 2
-    if len(square) < LEAST_SECONDS:
+    if len(square) < MIN_SECONDS:
         return np.inf
     most, rate = round(EVENTS_SHARE * len(square)), HOUR / (FALSE_EVERY * joints)
     surely = _tail(square, most).level(rate)
@@ -305,7 +305,7 @@ def _segments(
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.where(noise[:, None] > 0.0, np.clip(found, -most, most) / noise[:, None], 0.0)
 
-    for _ in range(MOST_IN_STRETCH):
+    for _ in range(MAX_EVENTS_PER_STRETCH):
         best, place, long = 1.0, -1, 0
         for length, score in scores:
             if not score.shape[1]:

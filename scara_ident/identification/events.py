@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.estimation.information import LEAST_NOISE
+from scara_ident.estimation.information import MIN_NOISE_SHARE
 from scara_ident.estimation.least_squares import weighted_value
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.identification.binned_residual import BIN, Binned, binned, bounded_noise
@@ -38,7 +38,7 @@ STATES = 40
 # Two lists hold the same event where their times overlap by this share.
 SAME = 0.5
 # Events that are said in words: a long file may have hundreds.
-MOST_SAID = 20
+MAX_SENTENCES = 20
 # Another joint is named with an event if it stands out by this share of what would make it one.
 SHARED = 0.45
 # Share of a repetition's residual at the same place that makes it the motion's doing.
@@ -138,8 +138,8 @@ class Event:
 
 def event_notes(robot: Robot, events: Sequence[Event]) -> list[str]:
     """Return events in words, of very many those that stand out most."""
-    least = sorted((event.score for event in events), reverse=True)[:MOST_SAID]
-    said = [event for event in events if event.score >= least[-1]][:MOST_SAID] if least else []
+    least = sorted((event.score for event in events), reverse=True)[:MAX_SENTENCES]
+    said = [event for event in events if event.score >= least[-1]][:MAX_SENTENCES] if least else []
     more = [f"{len(events) - len(said)} more events are listed in the result"] if len(events) > len(said) else []
     return [*(event.sentence(robot) for event in said), *more]
 
@@ -187,7 +187,7 @@ def find_events(observations: Observations, value: Array, fitted: Observations |
     ]
     if found:
         # Of an exact fit only rounding is left, which may stand out from itself.
-        least = LEAST_NOISE * observations.unfiltered_torque_rms
+        least = MIN_NOISE_SHARE * observations.unfiltered_torque_rms
         found = [event for event in found if event.rms > least[robot.joints.index(event.joints[0])]]
     return tuple(sorted(found, key=lambda event: (data_place(data, event.recording), event.start)))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from scara_ident.estimation.sample_columns import MOST_VALUES, evenly
+from scara_ident.estimation.sample_columns import MAX_VALUES, evenly
 from scara_ident.motion.prepared import PreparedData, PreparedRecording
 
 
@@ -22,7 +22,7 @@ def held_at_once(data: PreparedData, held_out: PreparedData) -> tuple[PreparedDa
     notes : list of str
         What is not looked at.
     """
-    count, most = _samples(data) + _samples(held_out), MOST_VALUES / max(1, len(data.bands))
+    count, most = _samples(data) + _samples(held_out), MAX_VALUES / max(1, len(data.bands))
     if count <= most:
         return data, held_out, []
     # What is held out has its share of what is held.

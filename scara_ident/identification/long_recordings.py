@@ -15,7 +15,7 @@ from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError
 from scara_ident.estimation.joint_rows import JointRows, joined
 from scara_ident.estimation.observations import Observations, observe
-from scara_ident.estimation.robust import MOST_BLOCKS
+from scara_ident.estimation.robust import MAX_BLOCKS
 from scara_ident.identification.events import Event, find_events, without_events
 from scara_ident.motion.prepared import prepare
 from scara_ident.progress import Tell, silent
@@ -41,7 +41,7 @@ class _Absorbed:
         columns = [rows.columns for rows in joints]
         grouped = tuple(rows.grouped(self.group) for rows in joints)
         self.joints = joined([self.joints, grouped], columns)[0] if self.joints else grouped
-        while len(self.joints[0].counts) > 2 * MOST_BLOCKS:
+        while len(self.joints[0].counts) > 2 * MAX_BLOCKS:
             self.group *= 2
             self.joints = tuple(rows.grouped(2) for rows in self.joints)
 

@@ -18,7 +18,7 @@ from scara_ident.motion.prepared import PreparedStretch
 # Rounds of fitting to signs and taking signs from the fit; they settle within ten where they settle at all.
 ROUNDS = 20
 # A fit that leaves less than this share of the torque is none to a magnitude: those of six arms left 18 to 51 %.
-LEAST_LEFT = 0.1
+MIN_UNEXPLAINED = 0.1
 # A share of the largest effort that counts as zero: resampling a log leaves rounding below it.
 ZERO = 1e-9
 # Directions that columns show by less than this share of the best are not told by the rows that are left where some are held out.
@@ -87,7 +87,7 @@ def signed_fits(observations: Observations) -> dict[int, SignedFit]:
             continue
         alone = observations.by_joint[j]
         size, plain = alone.torque_rms, alone.rms()
-        if plain > LEAST_LEFT * size:
+        if plain > MIN_UNEXPLAINED * size:
             joint = _joint(observations, j)
             fit = _fitted(joint)
             found[j] = SignedFit(plain / size, fit.left / float(np.linalg.norm(rows.table[-1])), joint, fit.signs)

@@ -31,7 +31,7 @@ LISTED = 3
 # A number that stands alone, and not within a name.
 _NUMBER = re.compile(r"(?<![\w.])[-+]?\d[\w.+-]*")
 # An rms of so many independent values is known to 1 / sqrt(2 N), here 22 % (the standard error of a standard deviation).
-LEAST_ROWS = 10
+MIN_ROWS = 10
 
 
 def usable_in_bands(
@@ -154,7 +154,7 @@ def with_rows(data: PreparedData, robot: Robot, *, needed: bool) -> tuple[Prepar
         Whether at least one has to be left; if all have too few, all are.
     """
     rows = side_by_side(kept_rows, data.recordings)
-    kept = [k for k, count in enumerate(rows) if count >= LEAST_ROWS]
+    kept = [k for k, count in enumerate(rows) if count >= MIN_ROWS]
     if len(kept) == len(rows) or (needed and not kept):
         return data, []
     said = (
@@ -163,7 +163,7 @@ def with_rows(data: PreparedData, robot: Robot, *, needed: bool) -> tuple[Prepar
             f"{count} independent rows are left once the ends and the times at rest are left out{_because(item, robot)}; left out",
         )
         for item, count in zip(data.recordings, rows, strict=True)
-        if count < LEAST_ROWS
+        if count < MIN_ROWS
     )
     return data.of(kept), _once(said)
 

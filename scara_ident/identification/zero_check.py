@@ -20,7 +20,7 @@ from scara_ident.identification.gravity_check import SAME_GRAVITY, left_under, o
 from scara_ident.identification.reading_search import SAME, ZERO_COST, cost, searched
 
 # Readings that leave as much and are named; of more nothing is told.
-MOST_RIVALS = 2
+MAX_READINGS = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +79,7 @@ def wrong_zeros(
     if _other_gravity(held, rows) * ALIKE <= tried[chosen]:
         return None
     found = _counted(held, before, pushing, most, rows, _common([chosen, *others])) if others else None
-    if found is not None or len(others) > MOST_RIVALS:
+    if found is not None or len(others) > MAX_READINGS:
         return found
     rivals = tuple(in_words(other, held.model.robot.joints) for other in others)
     return _counted(held, before, pushing, most, rows, chosen, rivals)

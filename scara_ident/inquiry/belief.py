@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.candidates.candidates import Rows, with_columns
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
-from scara_ident.diagnosis.testing.cluster_test import least_sizes, surely_needed
+from scara_ident.diagnosis.testing.cluster_test import min_sizes, surely_needed
 from scara_ident.diagnosis.testing.fitted_model import FittedModel, products_of
 from scara_ident.effects import Scene
 from scara_ident.estimation.information import Information, merge, triangular
@@ -34,7 +34,7 @@ _RANK = 1e-9
 # The largest effect that is too small to speak of is looked for to this share.
 NEAR = 0.01
 # Blocks of time of one inquiry: more of longer recordings are taken together, which says no more than there is.
-MOST_BLOCKS = 200
+MAX_BLOCKS = 200
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,8 +96,8 @@ class Blocks:
         return Blocks((table,), (starts,), self.owner[first], self.trajectory[first], stands_for=self.counts)
 
     def fewer(self) -> Blocks:
-        """Return neighbouring blocks of a recording together, so that there are not many more than `MOST_BLOCKS`."""
-        size = -(-len(self.owner) // MOST_BLOCKS)
+        """Return neighbouring blocks of a recording together, so that there are not many more than `MAX_BLOCKS`."""
+        size = -(-len(self.owner) // MAX_BLOCKS)
         if size <= 1:
             return self
         bounds = [0, *(np.flatnonzero(np.diff(self.owner)) + 1).tolist(), len(self.owner)]
@@ -255,7 +255,7 @@ def times_apart(
         basis = basis[:, singular > np.sqrt(_RANK)]
         apart = np.clip(whole - np.sum((basis.T @ torque) ** 2, axis=0), 0.0, None)
         # Of more squares than a rival may leave none is taken for another.
-        far = np.divide(apart, (1.0 - criteria.least_share) * whole, out=np.zeros(len(whole)), where=whole > 0.0)
+        far = np.divide(apart, (1.0 - criteria.min_share) * whole, out=np.zeros(len(whole)), where=whole > 0.0)
         squares = np.maximum(apart / (2.0 * criteria.alike) ** 2, far)
         inverse = np.divide(1.0, squares, out=np.full(len(whole), np.inf), where=squares > 0.0)
         mean = np.bincount(owner, inverse, len(others)) / np.bincount(owner, minlength=len(others))
@@ -302,11 +302,11 @@ def times_believed(
         whole = np.sum(found.columns, axis=1)
         outside = np.max(np.diagonal(whole, axis1=1, axis2=2) / np.maximum(found.sizes, np.finfo(float).tiny), axis=1)
         chance = criteria.family_error / tried
-        sizes = least_sizes(model, found, chance) if tested else np.full(len(group), surely_needed(k, chance))
+        sizes = min_sizes(model, found, chance) if tested else np.full(len(group), surely_needed(k, chance))
         folds = np.array([np.sum(found.columns[:, model.fold == f], axis=1) for f in range(model.folds)])
         costs = _costs(folds, whole - folds)
         for g, place in enumerate(group):
-            if outside[g] < criteria.least_outside:
+            if outside[g] < criteria.min_outside:
                 continue
             each = (folds[:, g], costs[:, g], float(sizes[g]), counts[place], criteria)
             squares = [_needed_square(axis, whole[g], *each) for axis in axes[place].T]
@@ -321,12 +321,12 @@ def _needed_square(
     excited = np.trace(folds, axis1=1, axis2=2)
     voting = excited >= criteria.abstains * np.mean(excited)
     helps, costs = np.einsum("i,fij,j->f", value, folds[voting], value), costs[voting]
-    in_all, share = float(value @ whole @ value), criteria.least_gain / (1.0 - criteria.least_gain)
+    in_all, share = float(value @ whole @ value), criteria.min_gain / (1.0 - criteria.min_gain)
     if in_all <= 0.0:
         return np.inf
     rest = np.sum(helps) - share * (in_all - np.sum(helps))
     gain = (share * count + (1.0 + share) * np.sum(costs)) / rest if rest > 0.0 else np.inf
-    least = max(0, int(np.ceil(criteria.least_votes * len(helps))) - 1)
+    least = max(0, int(np.ceil(criteria.min_votes * len(helps))) - 1)
     votes = np.sort(np.divide(costs, helps, out=np.full(len(helps), np.inf), where=helps > 0.0))[least]
     return float(max(errors**2 / in_all, gain, votes))
 

@@ -21,7 +21,7 @@ ASKED_SECONDS, ASKED_MOTION = 15.0, "excite --tell"
 # Kinds of questions whose motions come before recordings of another kind.
 URGENT = ("rivals", "unexplained")
 # Effects of which more could be said, and joints that are named of each.
-MOST, MOST_LABELS = 4, 3
+MOST, MAX_LABELS = 4, 3
 # By diagnosis: its file, its report and its story in words all hold them, and they take all its recordings.
 _FOUND: WeakKeyDictionary[Diagnosis, tuple[NextStep, ...]] = WeakKeyDictionary()
 
@@ -165,14 +165,14 @@ def _faint(diagnosis: Diagnosis) -> Iterator[NextStep]:
         if decision.accepted:
             continue
         name = decision.candidate.effect.name
-        if decision.examination.outside < criteria.least_outside:
+        if decision.examination.outside < criteria.min_outside:
             hidden.setdefault(name, []).append(decision)
         elif decision.gain > 0.0 and _significant(decision, diagnosis) and possible(decision, diagnosis):
             faint.setdefault(name, []).append(decision)
     for members in list(faint.values())[:MOST]:
-        yield NextStep(f"to judge {with_reasons(members)}", settled_by(diagnosis.search, members[:MOST_LABELS]))
+        yield NextStep(f"to judge {with_reasons(members)}", settled_by(diagnosis.search, members[:MAX_LABELS]))
     for members in list(hidden.values())[:MOST]:
-        labels = listed([member.label for member in members], MOST_LABELS, " and ")
+        labels = listed([member.label for member in members], MAX_LABELS, " and ")
         said = f"to see {labels} at all, which these recordings cannot show"
         yield NextStep(said, members[0].candidate.effect.experiment)
 
@@ -180,9 +180,9 @@ def _faint(diagnosis: Diagnosis) -> Iterator[NextStep]:
 def with_reasons(members: Sequence[Decision]) -> str:
     """Name candidates that are significant and not accepted, with the reason of all or each with its own."""
     said = "significant but not accepted"
-    if len({member.why for member in members[:MOST_LABELS]}) == 1:
-        return f"{listed([member.label for member in members], MOST_LABELS, ' and ')}, {said} ({members[0].why})"
-    return f"{listed([f'{member.label} ({member.why})' for member in members], MOST_LABELS, ' and ')}, {said}"
+    if len({member.why for member in members[:MAX_LABELS]}) == 1:
+        return f"{listed([member.label for member in members], MAX_LABELS, ' and ')}, {said} ({members[0].why})"
+    return f"{listed([f'{member.label} ({member.why})' for member in members], MAX_LABELS, ' and ')}, {said}"
 
 
 def _significant(decision: Decision, diagnosis: Diagnosis) -> bool:

@@ -22,15 +22,15 @@ from scara_ident.manners import listed
 
 Kind = Literal["rivals", "unexplained", "below_limit", "parameter"]
 # Rivals of one effect, and candidates that these recordings would hardly have shown: of each family, in all, and by name.
-MOST_RIVALS, MOST_OF_FAMILY, MOST_BELOW, MOST_NAMED = 4, 2, 24, 3
+MAX_RIVALS, MAX_PER_FAMILY, MAX_BELOW_LIMIT, MAX_NAMED = 4, 2, 24, 3
 # Of one suspect against another, at most.
-MOST_ODDS = 100.0
+MAX_ODDS = 100.0
 # What tells a remainder that no signal of the motion is known to make.
 HALF_THE_SPEED = (
     "repeat one trajectory at half the speed; how the remainder scales tells friction from inertia and from delays"
 )
 # Parameters asked for, and the standard deviation over the size that makes one unsure.
-MOST_PARAMETERS, UNSURE = 3, 0.3
+MAX_PARAMETERS, UNSURE = 3, 0.3
 
 
 @dataclass(frozen=True)
@@ -201,7 +201,7 @@ def _rivals(diagnosis: Diagnosis) -> Iterator[Question]:
         if effect.candidate not in own or effect.candidate is None:
             continue
         first = own[effect.candidate]
-        others = [item for item in effect.confounded_with if item.value and _moves(item.candidate)][:MOST_RIVALS]
+        others = [item for item in effect.confounded_with if item.value and _moves(item.candidate)][:MAX_RIVALS]
         suspects = (first, *(Suspect(item.candidate, item.label, item.value) for item in others))
         labels = frozenset(item.label for item in suspects)
         if others and _moves(first.candidate) and labels not in asked:
@@ -245,14 +245,14 @@ def _below_limit(diagnosis: Diagnosis, asked: set[str]) -> Iterator[Question]:
     for decision in sorted(_others(diagnosis), key=lambda item: (-_odds(item), item.examination.outside)):
         name = decision.candidate.effect.name
         limit, errors = _limit(decision.examination, diagnosis), _errors(decision.examination)
-        if decision.label in asked or not np.isfinite(limit) or errors == 0.0 or seen.get(name, 0) >= MOST_OF_FAMILY:
+        if decision.label in asked or not np.isfinite(limit) or errors == 0.0 or seen.get(name, 0) >= MAX_PER_FAMILY:
             continue
         seen[name] = seen.get(name, 0) + 1
         value = limit / errors * decision.examination.value
         suspects.append(Suspect(decision.candidate, decision.label, tuple(float(x) for x in value), _odds(decision)))
     if suspects:
-        chosen = tuple(suspects[:MOST_BELOW])
-        text = f"what these recordings hardly show: {listed([item.label for item in chosen], MOST_NAMED)}"
+        chosen = tuple(suspects[:MAX_BELOW_LIMIT])
+        text = f"what these recordings hardly show: {listed([item.label for item in chosen], MAX_NAMED)}"
         yield Question("below_limit", text, chosen, experiment="record another motion over the whole workspace")
 
 
@@ -265,7 +265,7 @@ def _parameters(diagnosis: Diagnosis) -> Iterator[Question]:
     nominal[model.place(body)] = (body.base.grouping @ model.robot.standard_parameters())[body.kept]
     size = np.maximum(np.abs(after.value[: len(nominal)]), np.abs(nominal))
     share = np.divide(after.std[: len(size)], size, out=np.zeros(len(size)), where=nominal != 0.0)
-    for k in np.argsort(-share)[:MOST_PARAMETERS]:
+    for k in np.argsort(-share)[:MAX_PARAMETERS]:
         if share[k] > UNSURE:
             name = model.columns[k].name
             yield Question("parameter", f"value of {name}", parameter=name, size=float(size[k]),
@@ -334,10 +334,10 @@ def odds_of(p_value: float) -> float:
     """Return the most that a p-value speaks for an effect and against none, ``-1 / (e p ln p)``.
 
     Sellke, Bayarri and Berger, "Calibration of p values for testing precise null hypotheses", The American Statistician
-    55(1), 2001; where it says nothing 1, and at most `MOST_ODDS`, so that none is forgotten for what may be another's.
+    55(1), 2001; where it says nothing 1, and at most `MAX_ODDS`, so that none is forgotten for what may be another's.
     """
     p = min(float(p_value), np.exp(-1.0))
-    return MOST_ODDS if p <= 0.0 else float(min(MOST_ODDS, -1.0 / (np.e * p * np.log(p))))
+    return MAX_ODDS if p <= 0.0 else float(min(MAX_ODDS, -1.0 / (np.e * p * np.log(p))))
 
 
 def _errors(found: Examination) -> float:

@@ -29,7 +29,7 @@ from scara_ident.robot.robot import Robot, build_robot, load_robot
 from scara_ident.robot.signal_map import SIGNALS, contract_channels
 
 # Joints that a note names.
-MOST_NAMED = 6
+MAX_NAMED = 6
 
 
 @dataclass(frozen=True)
@@ -193,7 +193,7 @@ def _moving_alone(recording: Recording | None) -> list[str]:
     if not idle or not moving:
         return []
     return [
-        f"where no recording moves more than {listed(moving, MOST_NAMED)}, --joints '{'|'.join(moving)}' identifies "
+        f"where no recording moves more than {listed(moving, MAX_NAMED)}, --joints '{'|'.join(moving)}' identifies "
         f"{'it' if len(moving) == 1 else 'them'} alone, with the other joints locked where they stand here"
     ]
 

@@ -67,7 +67,7 @@ TORQUE = frozenset(
 )  # fmt: skip
 
 # A joint's number has no more; Python makes no number of thousands.
-MOST_DIGITS = 9
+MAX_DIGITS = 9
 _TOKEN = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|[0-9]+")
 _BRACKETS = re.compile(r"[\[(<{]\s*([^\])>}]*?)\s*[\])>}]")
 # Units at the end of a name, as in elbow_pos_deg; a bare letter would be taken for too much.
@@ -141,7 +141,7 @@ def meaning(name: str, joints: Sequence[str] = ()) -> Meaning:
     words = [token[0].lower() for token in tokens]
     joint, span = _joint([_spellings(name[token.start() : token.end()]) for token in tokens], joints)
     rest = [k for k in range(len(words)) if span is None or not span[0] <= k < span[1]]
-    numbers = [k for k in rest if words[k].isdigit() and len(words[k]) <= MOST_DIGITS]
+    numbers = [k for k in rest if words[k].isdigit() and len(words[k]) <= MAX_DIGITS]
     spoken = _spoken([words[k] for k in rest])
     template, number = name, None
     if span is not None:

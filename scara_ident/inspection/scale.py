@@ -15,7 +15,7 @@ from scara_ident.robot.robot import Robot
 # Of both sides of the equation, Hz: gravity and inertia of an arm are below, and no choice is needed for a rough scale.
 BAND = 4.0
 # The URDF's torque tells the scale of a joint where it leaves less than this share of what friction and a rotor alone leave.
-MOST_LEFT = 0.35
+MAX_UNEXPLAINED = 0.35
 # A scale within this factor of 1 is what a URDF with rough masses gives.
 USUAL = 2.0
 # A scale that is larger on every joint is as likely the reduction of a gear in front of which torque was measured: of arms it is 30 and more.
@@ -81,6 +81,6 @@ def _scales(recording: Recording, robot: Robot) -> dict[int, float]:
         value = np.linalg.lstsq(with_urdf, effort, rcond=None)[0]
         without = np.linalg.lstsq(with_urdf[:, :-1], effort, rcond=None)[0]
         left = np.linalg.norm(effort - with_urdf @ value)
-        if value[-1] and left < MOST_LEFT * np.linalg.norm(effort - with_urdf[:, :-1] @ without):
+        if value[-1] and left < MAX_UNEXPLAINED * np.linalg.norm(effort - with_urdf[:, :-1] @ without):
             scales[j] = float(1.0 / value[-1])
     return scales

@@ -13,7 +13,7 @@ from scara_ident.robot.robot import Robot
 from scara_ident.robot.units import table_of
 
 # Of a position's own spread (std) a link lags its motor by less, unless the gear is broken.
-MOST_LAG = 0.02
+MAX_LAG = 0.02
 
 
 def second_encoder(
@@ -57,7 +57,7 @@ def second_encoder(
                 continue
             place = motor.factor * numbers[position.columns[k]]
             lag = place - table[unit].factor * numbers[signal.columns[k]]
-            if 0.0 < float(np.nanstd(lag)) < MOST_LAG * float(np.nanstd(place)):
+            if 0.0 < float(np.nanstd(lag)) < MAX_LAG * float(np.nanstd(place)):
                 columns[k], units[k] = signal.columns[k], unit
         if columns:
             return Signal("link_position", columns, template, signal.first_number, units)

@@ -34,7 +34,7 @@ RANK_TOLERANCE = 2e-5
 EXACT_TOLERANCE = 1e-9
 # Random states: four for each standard parameter, within these. A state gives a row for every joint, and a joint adds
 # eleven parameters, so that the largest number has tens of times the rows that a tree of any size needs.
-FEWEST_STATES, MOST_STATES = 40, 400
+FEWEST_STATES, MAX_STATES = 40, 400
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -262,7 +262,7 @@ def _random_columns(robot: Robot, seed: int) -> Array:
     """Stack the standard regressor of random states that move gravity, speed and acceleration alike."""
     rng = np.random.default_rng(seed)
     n, length = robot.n, size_of(robot)
-    samples = min(max(FEWEST_STATES, 44 * n), MOST_STATES)
+    samples = min(max(FEWEST_STATES, 44 * n), MAX_STATES)
     gravity = float(np.linalg.norm(robot.model.gravity.linear))
     rate = np.sqrt((gravity if gravity > 0.0 else 9.81) / length)
     stroke = np.where(robot.prismatic, length, np.pi)[:, None]

@@ -15,13 +15,13 @@ SAME_MOTION = 0.01
 # Less than this much of their range apart, on average, positions may be near each other because little time is between.
 NEAR = 0.1
 # A joint's range counts as at least this share of the widest joint's: one that stands still has only noise for a range.
-LEAST_RANGE = 0.01
+MIN_RANGE_SHARE = 0.01
 # Hz at which positions are laid on each other.
 FINE_RATE = 100.0
 # Share of its last period that a recording may lack.
 CUT = 0.02
 # Distances in time that are looked at closely, the shortest first, and s about each of them.
-MOST_TRIED, BESIDE = 6, 0.4
+MAX_LAGS, BESIDE = 6, 0.4
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ def periods_of(stretch: Stretch) -> Periods | None:
     spread = np.ptp(position, axis=1)
     if not np.any(spread > 0.0):
         return None
-    position /= np.sqrt(len(spread)) * np.maximum(spread, LEAST_RANGE * np.max(spread))[:, None]
+    position /= np.sqrt(len(spread)) * np.maximum(spread, MIN_RANGE_SHARE * np.max(spread))[:, None]
     for near in _lags(position):
         lag = _closest(position, near, round(BESIDE * rate))
         first, stop = _longest(_apart(position, lag) < SAME_MOTION**2)
@@ -90,7 +90,7 @@ def _lags(position: Array) -> list[int]:
     before, own, after = distance[inner - 1], distance[inner], distance[inner + 1]
     lowest = inner[(own <= before) & (own < after) & (own < np.median(distance[away]))]
     # The way to the path and back moves the minimum, but most of the motion lies near itself there all the same.
-    return [int(lag) for lag in lowest if np.median(_apart(position, lag)) < NEAR**2][:MOST_TRIED]
+    return [int(lag) for lag in lowest if np.median(_apart(position, lag)) < NEAR**2][:MAX_LAGS]
 
 
 def _closest(position: Array, lag: int, beside: int) -> float:

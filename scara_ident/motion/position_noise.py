@@ -39,7 +39,7 @@ TOP = 0.35
 # quieter, an rms is looked at. Fewer than so many of them tell no such share.
 QUIET_SAMPLES = 32
 QUIET_SHARE = 0.1
-LEAST_BLOCKS = 20
+MIN_BLOCKS = 20
 # Where steps fall anew is that of a position that has little left of them: with much left, the same ones would come
 # again. Whether it is the motion to less than a step matters not.
 STEPLESS = 0.02
@@ -269,7 +269,7 @@ def _level_at_quietest(part: PreparedStretch, joint: int) -> float:
     blocks = (part.stretch.position[joint] - smooth)[: count * QUIET_SAMPLES].reshape(count, QUIET_SAMPLES)
     # An encoder whose steps were filtered away is silent at rest.
     moving = np.all(part.used[joint][: count * QUIET_SAMPLES].reshape(count, QUIET_SAMPLES), axis=1)
-    if np.count_nonzero(moving) < LEAST_BLOCKS:
+    if np.count_nonzero(moving) < MIN_BLOCKS:
         return float("inf")
     from scipy.special import chdtri
 

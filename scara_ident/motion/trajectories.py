@@ -16,16 +16,16 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.motion.motion import Stretch
-from scara_ident.motion.periods import FINE_RATE, LEAST_RANGE, SAME_MOTION, at_rate
+from scara_ident.motion.periods import FINE_RATE, MIN_RANGE_SHARE, SAME_MOTION, at_rate
 
 # Repetitions start within this many seconds of each other after alignment; more is another motion.
 LARGEST_SHIFT = 1.0
 # Sample rates that differ by more than this share are not compared sample by sample.
 SAME_RATE = 1e-3
 # A run shorter than this share of another says too little of whether it is its motion, ...
-LEAST_LENGTH = 0.5
+MIN_LENGTH_SHARE = 0.5
 # ... as do parts that hold less than this share of the range of every joint: at rest all runs are alike.
-LEAST_MOVED = 0.5
+MIN_MOVED_SHARE = 0.5
 # Most motions are told apart at so few samples per second already, where a shift is known to half a sample only and so much
 # of their range is no difference yet.
 COARSE_RATE = 10.0
@@ -132,7 +132,7 @@ def _groups(stretches: Sequence[Stretch]) -> list[list[int]]:
 def _alike(some: Array, other: Array) -> NDArray[np.bool_]:
     """Tell which positions at the coarse rate, shape (k, n, N), may be of the motion of others, shape (n, M)."""
     lengths = some.shape[-1], other.shape[-1]
-    if not len(some) or min(lengths) < LEAST_LENGTH * max(lengths):
+    if not len(some) or min(lengths) < MIN_LENGTH_SHARE * max(lengths):
         return np.zeros(len(some), dtype=bool)
     distance, _ = _distances(some, other, round(LARGEST_SHIFT * COARSE_RATE))
     return np.asarray(np.min(distance, axis=-1, initial=np.inf) < COARSELY_SAME**2)
@@ -178,13 +178,13 @@ def alignment(reference: Array, other: Array, largest: int) -> int | None:
 def _ranges(one: Array, two: Array) -> Array:
     """Return the wider range of each joint of two motions, shape (..., n); one that stands still has only noise for it."""
     spread = np.maximum(np.ptp(one, axis=-1), np.ptp(two, axis=-1))
-    return np.asarray(np.maximum(spread, np.maximum(LEAST_RANGE * np.max(spread, axis=-1, keepdims=True), 1e-12)))
+    return np.asarray(np.maximum(spread, np.maximum(MIN_RANGE_SHARE * np.max(spread, axis=-1, keepdims=True), 1e-12)))
 
 
 def _holds_motion(one: Array, two: Array, own: slice, others: slice) -> bool:
     """Tell whether parts of two motions hold enough of the range of any joint."""
     parts = np.maximum(np.ptp(one[:, own], axis=-1), np.ptp(two[:, others], axis=-1))
-    return bool(np.any(parts >= LEAST_MOVED * _ranges(one, two)))
+    return bool(np.any(parts >= MIN_MOVED_SHARE * _ranges(one, two)))
 
 
 def _distances(reference: Array, other: Array, largest: int) -> tuple[Array, int]:

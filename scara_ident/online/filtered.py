@@ -43,7 +43,7 @@ FREQUENCIES = 200
 # Rows of each joint in a block at the least: of fewer the causes of a change are not told apart.
 BLOCK_ROWS = 4
 # A row counts where the joint moves under so much of its pulse's power at least; with less, its neighbours hold most of it.
-LEAST_MOVING = 0.5
+MIN_MOVING_SHARE = 0.5
 # Lost samples are bridged up to this share of the period of the positions' low-pass: a straight line is then as good as noise.
 BRIDGED = 0.125
 
@@ -144,7 +144,7 @@ class RowFilter:
             table *= np.where(moves, size, 0.0)
             # Where part of a pulse is left out, so is that part of the noise's variance.
             share = (self.pulses**2 @ moves) / self.every
-            counts = share >= LEAST_MOVING
+            counts = share >= MIN_MOVING_SHARE
             found.append((self.pulses[counts] @ table.T) / np.sqrt(share[counts])[:, None])
         return found
 

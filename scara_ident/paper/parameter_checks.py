@@ -58,13 +58,13 @@ def friction_signs() -> Iterator[Check]:
                 ("least friction at speeds it was estimated from", TABLE_1.peak_velocity[joint][column]),
                 ("least friction at speeds the joint can reach", VELOCITY_LIMIT),
             ):
-                value, zero = least_friction(coefficients, top)
+                value, zero = min_friction(coefficients, top)
                 where = "" if zero is None else f", negative from {zero:.2f} rad/s on: it would drive the joint"
                 subject = Subject(section, quantity, trajectory, name, "N m")
                 yield inequality(subject, "computed >= 0", value >= 0.0, None, value, f"up to {top:g} rad/s{where}")
 
 
-def least_friction(coefficients: Array, top: float) -> tuple[float, float | None]:
+def min_friction(coefficients: Array, top: float) -> tuple[float, float | None]:
     """Least friction torque at speeds above 0 up to ``top``, and where it first becomes negative.
 
     Parameters

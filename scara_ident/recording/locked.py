@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from scara_ident.robot.robot import Robot
 
 # rad or m by which a locked joint may move before it is said.
-MOST_TRAVEL = 0.01
+MAX_TRAVEL = 0.01
 
 
 def read_beside_locked(
@@ -81,7 +81,7 @@ def moving_though_locked(robot: Robot, places: Mapping[str, Channel], columns: M
             continue
         channel = places[name]
         values = columns[channel.column][np.isfinite(columns[channel.column])]
-        if not len(values) or abs(channel.factor) * float(np.ptp(values)) <= MOST_TRAVEL:
+        if not len(values) or abs(channel.factor) * float(np.ptp(values)) <= MAX_TRAVEL:
             continue
         said = (
             f"{name} is locked at {place:.3g} in the model, and its column {channel.column!r} goes from {values.min():.3g} to "

@@ -20,13 +20,13 @@ from scara_ident.recording.files.parquet_csv import PER_VALUE
 from scara_ident.recording.files.parquet_rows import read_rows, row_groups, seekable
 
 # Longer parts of a recording are cut: no work of it needs more memory than this many samples take.
-MOST_SAMPLES = 60_000
+MAX_SAMPLES = 60_000
 # A file of more samples is read in parts. As many at once take 0.6 GB of a two-joint arm and 1.7 GB of a seven-joint one
 # (benchmarks/streaming.py), what a small machine has.
 LONGEST_WHOLE = 500_000
 # Samples that are read at once, and samples that are kept for what has to see samples side by side, in so many windows.
-PART = 4 * MOST_SAMPLES
-KEPT = 4 * MOST_SAMPLES
+PART = 4 * MAX_SAMPLES
+KEPT = 4 * MAX_SAMPLES
 WINDOWS = 8
 # Samples of the clock that are looked at together.
 CLOCK_ROWS = 1_000_000
@@ -134,6 +134,6 @@ def cut_long(bounds: Sequence[int]) -> list[int]:
     """Divide parts that are too long into equal ones."""
     found = [bounds[0]]
     for start, stop in pairwise(bounds):
-        pieces = -(-(stop - start) // MOST_SAMPLES)
+        pieces = -(-(stop - start) // MAX_SAMPLES)
         found += [start + (stop - start) * k // pieces for k in range(1, pieces + 1)]
     return found

@@ -21,7 +21,7 @@ MOVING = 0.5
 # Of all windows of the recordings compared with, those with the smallest hashes are kept, so many; 16 bytes each.
 KEPT = 65536
 # A copy of this share of a recording is no accident, if it is at least so many windows.
-LEAST_SHARE, FEWEST = 0.02, 3
+MIN_SHARE, FEWEST = 0.02, 3
 # Samples at a time.
 CHUNK = 65536
 # Of single samples of one joint one in 2 to the power of this is looked at to tell whether recordings may share any samples.
@@ -51,7 +51,7 @@ def shared_samples(
     for place, recording in enumerate(known):
         sketch = _with_windows(sketch, recording, place)
     for other in others:
-        found = _most_shared(sketch, other, known)
+        found = _max_shared(sketch, other, known)
         if found is not None:
             yield other, *found
 
@@ -67,7 +67,7 @@ def copies_among(recordings: Sequence[Recording]) -> dict[int, tuple[Recording, 
     sketch, copies = _EMPTY, {}
     for place in _may_share(recordings):
         recording = recordings[place]
-        found = _most_shared(sketch, recording, recordings)
+        found = _max_shared(sketch, recording, recordings)
         if found is None:
             sketch = _with_windows(sketch, recording, place)
         else:
@@ -86,7 +86,7 @@ def _may_share(recordings: Sequence[Recording]) -> list[int]:
     values, counts = np.unique(np.concatenate(few), return_counts=True)
     common = values[counts > 1]
     shared = [np.count_nonzero(np.isin(own, common, assume_unique=True)) for own in few]
-    return [k for k, own in enumerate(few) if shared[k] > 0.5 * LEAST_SHARE * len(own)]
+    return [k for k, own in enumerate(few) if shared[k] > 0.5 * MIN_SHARE * len(own)]
 
 
 def _few(recording: Recording) -> Hashes:
@@ -108,7 +108,7 @@ def _with_windows(sketch: Sketch, recording: Recording, place: int) -> Sketch:
     return values, owners
 
 
-def _most_shared(sketch: Sketch, other: Recording, known: Sequence[Recording]) -> tuple[Recording, float] | None:
+def _max_shared(sketch: Sketch, other: Recording, known: Sequence[Recording]) -> tuple[Recording, float] | None:
     """Return the known recording with which another shares most and the share that is in any; None by accident."""
     values, owners = sketch
     if not len(values):
@@ -123,7 +123,7 @@ def _most_shared(sketch: Sketch, other: Recording, known: Sequence[Recording]) -
         seen += len(asked)
         hits += np.bincount(owners[places[same]], minlength=len(known))
     total = int(hits.sum())
-    if total < FEWEST or total < LEAST_SHARE * seen:
+    if total < FEWEST or total < MIN_SHARE * seen:
         return None
     return known[int(np.argmax(hits))], total / seen
 

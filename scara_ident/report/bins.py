@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scara_ident.arrays import Array
 
 MEAN_BINS = 24
-LEAST_COUNT = 8
-LEAST_VISITS = 5
+MIN_COUNT = 8
+MIN_VISITS = 5
 # Samples, which the band leaves independent, after which residuals are no longer alike.
 LONGEST_VISIT = 25
 DENSITY_BINS = (72, 44)
@@ -80,7 +80,7 @@ def _means(place: NDArray[np.intp], y: Array, centres: Array) -> Means:
     count = np.bincount(place[inside], minlength=bins)
     visits = np.bincount(place[enters], minlength=bins)
     total = np.bincount(place[inside], y[inside], minlength=bins)
-    enough = count >= LEAST_COUNT
+    enough = count >= MIN_COUNT
     size = np.maximum(count, 1)
     mean = total / size
     visit = (np.cumsum(enters) - 1)[inside]
@@ -88,7 +88,7 @@ def _means(place: NDArray[np.intp], y: Array, centres: Array) -> Means:
     scatter = np.bincount(place[enters], departures**2, minlength=bins) * visits / np.maximum(visits - 1, 1)
     spread = np.bincount(place[inside], (y[inside] - mean[place[inside]]) ** 2, minlength=bins) / size
     # Few visits do not show their own scatter: then that of the samples stands for it.
-    variance = np.where(visits >= LEAST_VISITS, scatter / size**2, spread / np.maximum(visits, 1))
+    variance = np.where(visits >= MIN_VISITS, scatter / size**2, spread / np.maximum(visits, 1))
     return Means(centres, np.where(enough, mean, np.nan), np.where(enough, np.sqrt(variance), np.nan))
 
 

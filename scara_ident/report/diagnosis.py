@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from scara_ident.diagnosis.diagnose import Diagnosis
-from scara_ident.diagnosis.evidence.evidence import least_found
+from scara_ident.diagnosis.evidence.evidence import min_found
 from scara_ident.diagnosis.fitting.effect_parameters import RotorInertia
 from scara_ident.diagnosis.found_effect import FoundEffect
 from scara_ident.diagnosis.testing.acceptance import Decision
@@ -173,7 +173,7 @@ def _candidate(decision: Decision, diagnosis: Diagnosis) -> dict[str, Any]:
         "gain": decision.gain,
         "helps_in": [helps, voting],
         "outside_model": decision.examination.outside,
-        "detection_limit": {name: item.value for name, item in least_found(diagnosis.search, decision).items()},
+        "detection_limit": {name: item.value for name, item in min_found(diagnosis.search, decision).items()},
         "nonlinear": {
             parameter.name: value
             for parameter, value in zip(

@@ -45,12 +45,12 @@ COLORS = {
 DPI = 110
 # In inches: least width of a picture and of a figure, a pixel of the page, and the room around a figure's panels.
 # Nothing has to be measured first, which is what takes the time.
-LEAST_WIDTH, LEAST_COLUMN, PIXEL = 10.0, 4.5, 0.0115
+MIN_WIDTH, MIN_COLUMN, PIXEL = 10.0, 4.5, 0.0115
 TOP, LEFT, RIGHT, BOTTOM, GAP, LEGEND, LETTER = 0.3, 0.8, 0.25, 0.62, 0.1, 0.25, 0.055
 MATRIX_HEIGHT = 240
-MOST_TICKS = 5
+MAX_TICKS = 5
 # A line of more than four times so many samples is drawn by the extremes of so many parts, which keeps its peaks.
-MOST_PARTS = 600
+MAX_PARTS = 600
 
 
 def draw(path: Path, title: str, rows: Sequence[Sequence[Figure]]) -> None:
@@ -86,12 +86,12 @@ def drawn(title: str, rows: Sequence[Sequence[Figure]]) -> bytes:
     return content.getvalue()
 
 
-def canvas(title: str, rows: Sequence[Sequence[Figure]], *, least_width: float = LEAST_WIDTH) -> Canvas:
+def canvas(title: str, rows: Sequence[Sequence[Figure]], *, min_width: float = MIN_WIDTH) -> Canvas:
     """Return figures in rows as one picture of at least a width, inches, see `draw`."""
     from matplotlib.figure import Figure as Canvas
 
     rows = [row for row in rows if row]
-    width = max(least_width, LEAST_COLUMN * max((len(row) for row in rows), default=1))
+    width = max(min_width, MIN_COLUMN * max((len(row) for row in rows), default=1))
     told: set[str] = set()
     legends = []
     for row in rows:
@@ -190,9 +190,9 @@ def _draw_panel(axis: Axes, panel: Panel, plot: Plot) -> None:
         if layer not in fitted:
             _draw_layer(axis, layer)
     if not plot.log and not plot.names:
-        axis.locator_params(axis="x", nbins=MOST_TICKS)
+        axis.locator_params(axis="x", nbins=MAX_TICKS)
     if not panel.log:
-        axis.locator_params(axis="y", nbins=MOST_TICKS)
+        axis.locator_params(axis="y", nbins=MAX_TICKS)
     if not panel.log and not plot.equal:
         axis.axhline(0.0, color="0.5", lw=0.5, zorder=0)
     if plot.names:
@@ -211,7 +211,7 @@ def _draw_layer(axis: Axes, layer: Layer) -> None:
     color = COLORS[str(getattr(layer, "color", "black"))]
     match layer:
         case Line():
-            size = layer.x.count // MOST_PARTS if isinstance(layer.x, Grid) else 0
+            size = layer.x.count // MAX_PARTS if isinstance(layer.x, Grid) else 0
             thin = layer.thinned(size if size >= 4 else 1)
             dash: Any = (0, tuple(float(x) for x in thin.dash.split())) if thin.dash else "-"
             axis.plot(_along(thin.x), np.asarray(thin.y), color=color, lw=0.8 * thin.width, ls=dash, label=name)

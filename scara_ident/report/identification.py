@@ -15,7 +15,7 @@ from scara_ident.estimation.estimate import PAPER_SAMPLES
 from scara_ident.estimation.noise_bias import bias_sentence
 from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.pushing import BEYOND_CHANCE, pushes
-from scara_ident.estimation.run_variation import LEAST_RUNS
+from scara_ident.estimation.run_variation import MIN_RUNS
 from scara_ident.estimation.saved import estimate_dict
 from scara_ident.estimation.urdf_scale import scale_sentence, urdf_scale
 from scara_ident.estimation.urdf_weight import rotor_sentence, told_scale
@@ -34,7 +34,7 @@ from scara_ident.report.doubts import doubts
 from scara_ident.robot.robot import Robot
 
 # Names in a sentence, at the most.
-MOST_NAMED = 12
+MAX_NAMED = 12
 # So few recordings in words.
 NUMBERS = {1: "one recording", 2: "two recordings"}
 # What each shape of friction means.
@@ -151,7 +151,7 @@ def _others(identification: Identification) -> list[str]:
     open_ = undetermined(identification)
     if open_:
         found.append(
-            f"The data leave {listed(open_, MOST_NAMED)} undetermined; a motion that excites {'it' if len(open_) == 1 else 'them'} "
+            f"The data leave {listed(open_, MAX_NAMED)} undetermined; a motion that excites {'it' if len(open_) == 1 else 'them'} "
             "is needed."
         )
     else:
@@ -171,18 +171,18 @@ def _others(identification: Identification) -> list[str]:
             found.append(below)
     small = not_told_from_zero(identification)
     if small:
-        found.append(f"Within two standard deviations of zero: {listed(small, MOST_NAMED)}.")
+        found.append(f"Within two standard deviations of zero: {listed(small, MAX_NAMED)}.")
     unsure = of_unknown_std(identification)
     if unsure:
         found.append(
-            f"How sure {listed(unsure, MOST_NAMED)} {'is' if len(unsure) == 1 else 'are'}, is not known: one stretch of time tells "
+            f"How sure {listed(unsure, MAX_NAMED)} {'is' if len(unsure) == 1 else 'are'}, is not known: one stretch of time tells "
             f"{'it' if len(unsure) == 1 else 'them'} all but alone, and nothing says how far another would differ; record longer."
         )
     found.append(weights_said(identification.estimate))
     if identification.estimate.variation:
         found += [f"{said}." for said in identification.estimate.variation.sentences(robot)]
     runs = len(identification.training.data.recordings)
-    if runs < LEAST_RUNS:
+    if runs < MIN_RUNS:
         few = "How runs differ" if runs == 1 else "How runs differ but for offsets"
         found.append(f"{few} is not known from {NUMBERS[runs]}, and is in no standard deviation: record three or more.")
     biased = bias_said(identification.estimate)
@@ -215,8 +215,8 @@ def below_zero_said(estimate: Estimate, observations: Observations) -> str | Non
             beyond = {name: stds for name, stds in beyond.items() if name not in own}
             beyond[f"friction of {robot.joints[j]} at {push.speed:.2g} {robot.position_unit(j)}/s"] = push.stds
     if beyond:
-        most_first = sorted(beyond, key=lambda name: -beyond[name])
-        said = listed([f"{name} by {beyond[name]:.2g} standard deviations" for name in most_first], MOST_NAMED)
+        max_first = sorted(beyond, key=lambda name: -beyond[name])
+        said = listed([f"{name} by {beyond[name]:.2g} standard deviations" for name in max_first], MAX_NAMED)
         return (
             f"Below zero by more than chance: {said}. Something that the model lacks or the description has wrong is in them, and may be in "
             "any parameter; standard deviations hold none of it, and a possible arm hides it: diagnose the recordings."
@@ -263,6 +263,6 @@ def _shapes_said(choices: Sequence[ShapeChoice]) -> list[str]:
         tested = "" if choice.p_value is None else f" (p = {choice.p_value:.2g})"
         groups.setdefault((choice.shape, choice.why), []).append(f"{choice.joint}{tested}")
     return [
-        f"Friction is {shape} ({SHAPES[shape]}) on {listed(joints, MOST_NAMED)}: {why}."
+        f"Friction is {shape} ({SHAPES[shape]}) on {listed(joints, MAX_NAMED)}: {why}."
         for (shape, why), joints in groups.items()
     ]

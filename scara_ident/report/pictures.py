@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from scara_ident.excitation.design import Design
 
 # Recordings shown, at the most; the first held-out ones before the fitted ones.
-MOST_RECORDINGS = 4
+MAX_RECORDINGS = 4
 # Pixels of the page that the torque of a joint has.
 HEIGHT = 170
 # Points of a designed motion.
@@ -59,7 +59,7 @@ def torque_figures(
     rows: list[list[Figure]] = []
     for j, joint in enumerate(robot.joints):
         rows.append([])
-        for name, traces in context.parts[:MOST_RECORDINGS]:
+        for name, traces in context.parts[:MAX_RECORDINGS]:
             plot = torque_plot(robot, traces, j, bands[j])
             # Residual and torque over one axis: axes are what takes the time.
             panel = Panel(plot.panels[0].label, [layer for each in plot.panels for layer in each.layers], HEIGHT)

@@ -14,7 +14,7 @@ from scara_ident.arrays import Array
 from scara_ident.report.bins import Means
 
 # Arrays longer than this become 16-bit integers, which resolve 1/65000 of their range.
-MOST_PLAIN = 400
+MAX_PLAIN_LENGTH = 400
 _NO_VALUE = -32768
 _LARGEST = 32767
 # Colours and dashes that tell many lines apart.
@@ -39,7 +39,7 @@ def packed(values: ArrayLike) -> Any:
         Numbers that are not finite become gaps.
     """
     array = np.asarray(values, dtype=float)
-    if array.size <= MOST_PLAIN:
+    if array.size <= MAX_PLAIN_LENGTH:
         return [rounded(x) for x in array.tolist()]
     finite = np.isfinite(array)
     low, high = (float(np.min(array[finite])), float(np.max(array[finite]))) if finite.any() else (0.0, 0.0)

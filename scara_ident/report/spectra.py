@@ -20,12 +20,12 @@ PER_TURN = 64
 HIGHEST_ORDER = 16.0
 LOWEST_ORDER = 0.5
 # A joint that moves its motor by less has no spectrum over orders.
-LEAST_TURNS = 3.0
+MIN_TURNS = 3.0
 # Probability that noise alone crosses the bound at any order, and the width in bins of the median it is scaled to.
 FALSE_ALARM = 0.01
 MEDIAN_BINS = 41
 LONGEST_LAG = 1.5
-MOST_LAGS = 120
+MAX_LAGS = 120
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,12 +90,12 @@ def orders(robot: Robot, traces: Sequence[Trace], j: int, residuals: Sequence[Ar
     """
     turns = [trace.motion.q[j, trace.core] * robot.reduction[j] / (2.0 * np.pi) for trace in traces]
     span = max((float(np.ptp(turn)) for turn in turns if len(turn)), default=0.0)
-    if span < LEAST_TURNS:
+    if span < MIN_TURNS:
         return None
     length = PER_TURN * int(np.ceil(span) + 1)
     power, weight, parts = np.zeros(length // 2 + 1), 0.0, 0
     for turn, trace, residual in zip(turns, traces, residuals, strict=True):
-        if not len(turn) or np.ptp(turn) < LEAST_TURNS:
+        if not len(turn) or np.ptp(turn) < MIN_TURNS:
             continue
         values = residual[trace.core]
         # Only samples in motion: a joint at rest would weigh one angle with all its noise.
@@ -139,7 +139,7 @@ def autocorrelation(traces: Sequence[Trace], j: int) -> Autocorrelation | None:
     """Return the autocorrelation of the residual within the band, on the samples that the band leaves independent."""
     first = traces[0]
     step = first.step[j] / first.motion.rate
-    lags = max(4, min(MOST_LAGS, int(LONGEST_LAG / step)))
+    lags = max(4, min(MAX_LAGS, int(LONGEST_LAG / step)))
     total, count = np.zeros(lags + 1), np.zeros(lags + 1)
     for trace in traces:
         if abs(trace.step[j] / trace.motion.rate / step - 1.0) > 0.02:

@@ -21,7 +21,7 @@ PARTIAL = ("link_position",)
 # What a pattern may hold: the joint's name, its place in the robot description from 0, and from 1.
 PLACEHOLDERS = ("{joint}", "{index}", "{number}")
 # A rated torque is within this factor of the URDF's limit; below this share of it, it is that of one per cent.
-RATED_SPREAD, RATED_LEAST = 5.0, 0.1
+RATED_SPREAD, RATED_MIN = 5.0, 0.1
 
 
 @dataclass(frozen=True)
@@ -285,7 +285,7 @@ def check_rated_torque(
         if unit is None or unit.name not in ("%", "permille") or not np.isfinite(bound) or value == 1.0:
             continue
         whole = value / unit.factor
-        if value < RATED_LEAST * bound and bound / RATED_SPREAD < whole < RATED_SPREAD * bound:
+        if value < RATED_MIN * bound and bound / RATED_SPREAD < whole < RATED_SPREAD * bound:
             raise RobotError(
                 f"{source}: joints.{joint}.effort_gain: {value:g} N m would be the rated torque (100 %), and the URDF's "
                 f"limit is {bound:.4g} N m; with unit {unit.name} write the torque at 100 %: {whole:g} if this is N m per "

@@ -17,7 +17,7 @@ from scara_ident.robot.robot import Robot
 # Positions, velocities and accelerations in SI units beyond this are no motion of an arm.
 LARGEST = 1e9
 # Samples that a simulated run may have: most of three hours at 1 kHz.
-MOST_SAMPLES = 10_000_000
+MAX_SAMPLES = 10_000_000
 
 
 @dataclass(frozen=True, eq=False)

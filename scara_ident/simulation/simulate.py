@@ -17,7 +17,7 @@ from scara_ident.simulation.effects import Effect
 from scara_ident.simulation.effects.structure import Payload
 from scara_ident.simulation.inverse_dynamics import torque_at_start
 from scara_ident.simulation.plant import PlantDraft
-from scara_ident.simulation.reference import MOST_SAMPLES, ReferenceMotion
+from scara_ident.simulation.reference import MAX_SAMPLES, ReferenceMotion
 from scara_ident.simulation.runs import RunState, TorqueNoise
 from scara_ident.simulation.torque_sensor import recorded_effort
 from scara_ident.simulation.true_motion import TrueMotion, needed_substeps, true_motion
@@ -73,7 +73,7 @@ def simulate(
     ticks: int = 1,
     averaged: bool = False,
     substeps: int | None = None,
-    least_substeps: int = SUBSTEPS,
+    min_substeps: int = SUBSTEPS,
     record_velocity: bool = False,
     link_encoders: Sequence[str] = (),
     noise: TorqueNoise = WHITE,
@@ -104,8 +104,8 @@ def simulate(
     averaged : bool
         Whether the recorded effort is the mean over a whole sample instead, so that nothing of it is lost or aliased.
     substeps : int, optional
-        Integration steps per period of the controller; by default `least_substeps`, more where an elastic joint needs them.
-    least_substeps : int, optional
+        Integration steps per period of the controller; by default `min_substeps`, more where an elastic joint needs them.
+    min_substeps : int, optional
         Where nothing needs more; two are enough for tracking errors, in half the time.
     record_velocity : bool
         Whether the recording has the velocity that the controller saw.
@@ -161,7 +161,7 @@ def simulate(
     if added.shape != wanted.position.shape:
         raise UsageError(f"feed has shape {added.shape}; expected {wanted.position.shape}, a column per tick")
     position, velocity = reached.position[back], reached.velocity[back]
-    steps = max(least_substeps, needed_substeps(moved, draft, control)) if substeps is None else substeps
+    steps = max(min_substeps, needed_substeps(moved, draft, control)) if substeps is None else substeps
     measured, seen, true, stops = true_motion(
         moved, draft, control, steps, np.stack([position.T, velocity.T]),
         (arm.scale[:, None] * added)[back].T, start[back],
@@ -276,8 +276,8 @@ def _at_rate(arm: VirtualArm, motion: ReferenceMotion, rate: float) -> Reference
     if not rate > 0.0:
         raise UsageError(f"rate is {rate:g} Hz; expected a positive number")
     samples = int(np.floor(motion.duration * rate * (1.0 + 1e-12) + 1e-9)) + 1
-    if not 2 <= samples <= MOST_SAMPLES:
-        wrong = "less than a sample" if samples < 2 else f"more than {MOST_SAMPLES} samples"
+    if not 2 <= samples <= MAX_SAMPLES:
+        wrong = "less than a sample" if samples < 2 else f"more than {MAX_SAMPLES} samples"
         raise RecordingError(f"{motion.name}: lasts {motion.duration:g} s, {wrong} at {rate:g} Hz; give time in s")
     moved = motion.at(motion.time[0] + np.arange(samples) / rate)
     return ReferenceMotion(

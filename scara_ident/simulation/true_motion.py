@@ -13,7 +13,7 @@ from scara_ident.simulation.plant import PlantDraft
 
 # Steps of this share of the fastest natural period's radian keep the Runge-Kutta step accurate and stable.
 STIFF_STEP = 0.4
-MOST_SUBSTEPS = 400
+MAX_SUBSTEPS = 400
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,10 +161,10 @@ def needed_substeps(arm: VirtualArm, draft: PlantDraft, rate: float) -> int:
         both = np.array([i, j], dtype=int)
         square[both] += 4.0 * coulomb / (SHAFT_WAY * (link + rotor)[both])
     needed = int(np.ceil(float(np.sqrt(square.max())) / (rate * STIFF_STEP)))
-    if needed > MOST_SUBSTEPS:
+    if needed > MAX_SUBSTEPS:
         joint = arm.robot.joints[int(np.flatnonzero(arm.robot.order == int(np.argmax(square)))[0])]
         raise UsageError(
-            f"{joint}: so stiff that {needed} steps per sample would be needed (at most {MOST_SUBSTEPS}); "
+            f"{joint}: so stiff that {needed} steps per sample would be needed (at most {MAX_SUBSTEPS}); "
             "lower its stiffness, or raise its presliding distance or the speed over which its friction builds up"
         )
     return needed

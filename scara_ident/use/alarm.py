@@ -13,7 +13,7 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError
-from scara_ident.estimation.tail import CLUSTERS_OVER_RATE, LEAST_CLUSTERS, TOGETHER, Tail, fit_tail
+from scara_ident.estimation.tail import CLUSTERS_OVER_RATE, MIN_CLUSTERS, TOGETHER, Tail, fit_tail
 from scara_ident.use.external_torque import Observed
 
 # Groups of recordings left out to see how sure the rate is.
@@ -21,9 +21,9 @@ FOLDS = 5
 # Share of its samples that brings every joint's residual to one scale.
 COMMON = 0.995
 # Largest spread of the rate that is allowed for: more is a guess.
-MOST_SPREAD = 1.5
+MAX_SPREAD = 1.5
 # Least share of the mean size of a joint's peaks that their size is taken for in any state.
-LEAST_SCALE = 0.2
+MIN_SCALE = 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,9 +78,9 @@ def calibrate(runs: Sequence[Observed], rate: float) -> Alarm:
         If they are too short, or the rate is higher than peaks come.
     """
     seconds = np.array([np.sum(step_of(run)[run.settled]) for run in runs])
-    if np.sum(seconds) < LEAST_CLUSTERS:
+    if np.sum(seconds) < MIN_CLUSTERS:
         raise RecordingError(
-            f"{runs[0].name}: {np.sum(seconds):.3g} s without contact in all; thresholds need {LEAST_CLUSTERS} s or more"
+            f"{runs[0].name}: {np.sum(seconds):.3g} s without contact in all; thresholds need {MIN_CLUSTERS} s or more"
         )
     scale, floor = residual_scale(runs)
     # Joints are brought to one scale: none makes most alarms.
@@ -125,7 +125,7 @@ def stated_level(
     spread = float(np.sqrt((folds - 1) * np.var(logs)))
     # The mean of a rate that is known to so much in its logarithm is larger than its median: of a log-normal law by this.
     # What peaks make that do not depend on their recording is in the predictive rate already.
-    sure = 0.5 * max(0.0, min(spread, MOST_SPREAD) ** 2 - tail.log_variance(level))
+    sure = 0.5 * max(0.0, min(spread, MAX_SPREAD) ** 2 - tail.log_variance(level))
     return tail.level(rate * float(np.exp(-sure))), spread
 
 
@@ -147,7 +147,7 @@ def residual_scale(runs: Sequence[Observed]) -> tuple[Array, Array]:
     Peaks and not the mean, since a joint at rest has nearly the same residual all the time, and one that moves has not.
     """
     largest, _, features = in_windows(runs)
-    return made_of(largest, features), LEAST_SCALE * np.maximum(np.mean(largest, axis=1), 1e-12)
+    return made_of(largest, features), MIN_SCALE * np.maximum(np.mean(largest, axis=1), 1e-12)
 
 
 def made_of(size: Array, features: Array) -> Array:

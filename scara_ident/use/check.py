@@ -28,9 +28,9 @@ CLOSE, UNSURE = 2.0, 0.1
 # Slowest share of the speed that is tried, and how finely the largest that can be run is found.
 SLOWEST, STEPS = 0.02, 14
 # Limits or joints in a sentence, at the most.
-MOST_NAMED = 6
+MAX_NAMED = 6
 # Samples at which slower motions are looked at.
-MOST_SAMPLES = 5000
+MAX_SAMPLES = 5000
 
 
 @dataclass(frozen=True)
@@ -195,7 +195,7 @@ def slowed(motion: Motion, share: float) -> Motion:
 
 
 def _speed_share(known: IdentifiedModel, limits: JointLimits, drives: Sequence[Drive]) -> float | None:
-    every = max(1, sum(each.motion.samples for each in drives) // MOST_SAMPLES)
+    every = max(1, sum(each.motion.samples for each in drives) // MAX_SAMPLES)
     motions = [_every(each.motion, every) for each in drives]
 
     def runs(share: float) -> bool:
@@ -276,7 +276,7 @@ def sentences(found: Check) -> list[str]:
         )
         others = [f"{each.name} at {each.time:.3f} s" for each in found.broken[1:]]
         if others:
-            said.append(f"Also beyond their limits: {listed(others, MOST_NAMED)}.")
+            said.append(f"Also beyond their limits: {listed(others, MAX_NAMED)}.")
     close = _close(found)
     if close:
         said.append(
@@ -289,7 +289,7 @@ def sentences(found: Check) -> list[str]:
     ]
     if unsure:
         said.append(
-            f"By two standard deviations the largest torque is known to no better than a tenth on {listed(unsure, MOST_NAMED)}."
+            f"By two standard deviations the largest torque is known to no better than a tenth on {listed(unsure, MAX_NAMED)}."
         )
     said.append(
         f"The drives give {energy.given.sum():.4g} J and take {energy.returned.sum():.4g} J back; "

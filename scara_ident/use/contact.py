@@ -13,7 +13,7 @@ from scara_ident.estimation.tail import clusters
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.kinematics import place_of
 from scara_ident.robot.robot import Robot
-from scara_ident.use.contact_force import LEAST_JOINTS, ContactForce, contact_force
+from scara_ident.use.contact_force import MIN_JOINTS, ContactForce, contact_force
 from scara_ident.use.contact_samples import STRONG
 from scara_ident.use.external_torque import FEATURES, Observed
 from scara_ident.use.observer import ContactObserver
@@ -126,7 +126,7 @@ def _contact(observer: ContactObserver, observed: Observed, threshold: Array, sh
     most = np.abs(mean) / np.mean(threshold[:, strong], axis=1)
     named = [int(j) for j in np.argsort(-most) if most[j] >= min(NAMED, float(np.max(most)))]
     told = contact_force(observer, observed, threshold, inside, strong)
-    if told.at_tool and len(named) < min(LEAST_JOINTS, robot.n):
+    if told.at_tool and len(named) < min(MIN_JOINTS, robot.n):
         told = ContactForce(told.explained, False)
     at_last = told.force is not None and not told.at_tool
     outermost = place_of(robot, robot.model.njoints - 1) if at_last else _outermost(robot, named)

@@ -21,9 +21,9 @@ from scara_ident.use.observer import ContactObserver
 
 # A constant force at the tool explains at least this share of the squared torque of a contact there, on at least so many
 # joints: on fewer nearly any torque is that of some force.
-FITS, LEAST_JOINTS = 0.75, 3
+FITS, MIN_JOINTS = 0.75, 3
 # Of a direction of the force that is told so much worse than another at once, none is told.
-LEAST_TOLD = 0.03
+MIN_DIRECTION_RATIO = 0.03
 # Probability that a force where it is said to act is refused for what it leaves of the torque.
 REFUSED = 0.01
 # Force and point of a contact are six numbers, told by so many joints.
@@ -87,7 +87,7 @@ def contact_force(
     fitted = contact_samples(observer, observed, threshold, inside, strong)
     at_tool = fitted.rows[..., 0]
     force, explained = constant_force(at_tool, fitted.torques)
-    told = told_at_once(at_tool, observer.felt) >= LEAST_TOLD
+    told = told_at_once(at_tool, observer.felt) >= MIN_DIRECTION_RATIO
     left = fitted.torques - at_tool @ force
     unsure = _unsure(fitted, left)
     beside = None

@@ -25,7 +25,7 @@ _MODELS = ("complete", "reduced", "basic")
 # Standard parameters of a body by kind: mass, first moments, moments of inertia.
 _KINDS = (slice(0, 1), slice(1, 4), slice(4, 10))
 # A kind of parameter that the URDF has none of counts as this share of the kind's largest one on the arm.
-_LEAST_SHARE = 1e-3
+_MIN_SHARE = 1e-3
 # Of the arm's largest rotor: less than nothing by less is rounding.
 _ROUNDING = 1e-9
 # Random poses at which the inertia must be positive.
@@ -122,7 +122,7 @@ def _nearest(arm: VirtualArm, body: RigidBody, base: Array, near: Array | None) 
     """
     n, grouping = arm.robot.n, body.base.grouping[body.kept]
     standard = np.concatenate([arm.bodies.ravel(), arm.armature]) if near is None else near.copy()
-    size = np.concatenate([np.tile(_sizes(arm.bodies), n), np.full(n, max(float(np.max(arm.armature)), _LEAST_SHARE))])
+    size = np.concatenate([np.tile(_sizes(arm.bodies), n), np.full(n, max(float(np.max(arm.armature)), _MIN_SHARE))])
     rotors = np.arange(10 * n, 11 * n)
     # A rotor that is shared with a link leaves to it what would take it below zero.
     free = np.ones(11 * n, dtype=bool)
@@ -179,7 +179,7 @@ def _sizes(bodies: Array) -> Array:
     size = np.empty(10)
     for kind in _KINDS:
         size[kind] = np.max(np.abs(bodies[:, kind]))
-    return np.maximum(size, _LEAST_SHARE * np.max(size))
+    return np.maximum(size, _MIN_SHARE * np.max(size))
 
 
 def light_joint(arm: VirtualArm) -> str:

@@ -15,7 +15,7 @@ from scara_ident.robot.robot import Robot
 
 # Least mass that a body stands for, kg, and how much more than another parameter a mass is held to what is wanted: a body
 # without mass has no centre of mass.
-LEAST_MASS, MASS_WEIGHT = 0.1, 1e3
+MIN_MASS, MASS_WEIGHT = 0.1, 1e3
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +93,7 @@ def arm_momentum(known: IdentifiedModel) -> ArmMomentum:
 def _standard(robot: Robot, grouping: Array, base: Array) -> Array:
     """Return standard parameters with given base parameters, near to the URDF's, with masses that are not 0."""
     wanted = robot.standard_parameters()
-    wanted[: 10 * robot.n : 10] = np.maximum(wanted[: 10 * robot.n : 10], LEAST_MASS)
+    wanted[: 10 * robot.n : 10] = np.maximum(wanted[: 10 * robot.n : 10], MIN_MASS)
     scale = np.ones(len(wanted))
     scale[: 10 * robot.n : 10] = 1.0 / MASS_WEIGHT
     step = scale * np.linalg.lstsq(grouping * scale, base - grouping @ wanted, rcond=None)[0]

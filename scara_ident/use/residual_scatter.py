@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.use.alarm import LEAST_SCALE, in_windows, made_of
+from scara_ident.use.alarm import MIN_SCALE, in_windows, made_of
 from scara_ident.use.external_torque import Observed
 
 
@@ -44,7 +44,7 @@ def residual_scatter(runs: Sequence[Observed]) -> ResidualScatter:
     """
     _, square, features = in_windows(runs)
     squares = made_of(square, features**2)
-    least = LEAST_SCALE**2 * np.maximum(np.mean(square, axis=1), 1e-24)
+    least = MIN_SCALE**2 * np.maximum(np.mean(square, axis=1), 1e-24)
     products = np.zeros((len(least), len(least)))
     for run in runs:
         size = np.sqrt(_mean_squares(squares, least, run.features[:, :, run.settled]))

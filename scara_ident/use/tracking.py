@@ -169,7 +169,7 @@ def _followed(
     """Return a run of an arm, or say why none with its parameters can be held."""
     for steps in (SUBSTEPS, MORE_SUBSTEPS):
         try:
-            return simulate(arm, motion, effects=effects, feed=feed, rate=RATE, seed=seed, least_substeps=steps)
+            return simulate(arm, motion, effects=effects, feed=feed, rate=RATE, seed=seed, min_substeps=steps)
         except LostArm:
             continue
     raise LostArm(

@@ -51,8 +51,8 @@ def test_every_number_has_a_unit_a_reason_and_a_source():
 
 
 def test_what_they_stand_behind_keeps_its_order():
-    assert CRITERIA.absorbed < CRITERIA.least_outside
-    assert CRITERIA.least_gain < CRITERIA.remainder
+    assert CRITERIA.absorbed < CRITERIA.min_outside
+    assert CRITERIA.min_gain < CRITERIA.remainder
     assert CRITERIA.wider > 1.0
 
 
@@ -62,19 +62,19 @@ def test_what_they_stand_behind_keeps_its_order():
     [
         ({}, "explained", ["spring"]),
         # With a bar that nothing clears the remainder stays.
-        ({"least_gain": 1.01}, "unexplained", []),
-        ({"most_effects": 0}, "unexplained", []),
+        ({"min_gain": 1.01}, "unexplained", []),
+        ({"max_effects": 0}, "unexplained", []),
         # Where so much may be left over, nothing is; but where nothing could have come in, that nothing did says nothing.
-        ({"least_gain": 1.01, "remainder": 1.01, "remainder_to_noise": 1e3, "least_remainder": 1.0}, "undecided", []),
+        ({"min_gain": 1.01, "remainder": 1.01, "remainder_to_noise": 1e3, "min_remainder": 1.0}, "undecided", []),
         (
             {
-                "least_gain": 1.01,
+                "min_gain": 1.01,
                 "remainder": 1.01,
                 "remainder_to_noise": 1e3,
-                "least_remainder": 1.0,
-                "least_power": 2.0,
+                "min_remainder": 1.0,
+                "min_power": 2.0,
                 # However little of it is white, or changes within recordings.
-                "least_colour": 1.0,
+                "min_colour": 1.0,
             },
             "complete",
             [],
@@ -98,7 +98,7 @@ def test_what_comes_after_the_most_effects_is_named_and_nothing_is_then_called_e
     runs = exact_runs()
     for joint in (0, 1):
         runs = with_torque(runs, joint, lambda motion, joint=joint: 0.05 * motion.q[joint])
-    few = replace(CRITERIA, most_effects=0)
+    few = replace(CRITERIA, max_effects=0)
     result = diagnose(load_robot(), runs, bands=BANDS, catalogue=(Spring(),), criteria=few)
     assert result.verdict != "explained" and result.verdict != "complete"
     left = [item for item in result.tentative if item.effect == "spring"]
@@ -109,21 +109,21 @@ def test_what_comes_after_the_most_effects_is_named_and_nothing_is_then_called_e
 @pytest.mark.slow
 def test_a_limit_doubled_or_halved_lets_an_effect_out_or_in():
     (spring,) = spring_diagnosed(CRITERIA).effects
-    below = replace(CRITERIA, least_gain=spring.gain / 1.5)
+    below = replace(CRITERIA, min_gain=spring.gain / 1.5)
     assert spring_diagnosed(below).effects
-    above = replace(below, least_gain=2.0 * below.least_gain)
+    above = replace(below, min_gain=2.0 * below.min_gain)
     assert not spring_diagnosed(above).effects
-    assert spring_diagnosed(replace(above, least_gain=0.5 * above.least_gain)).effects
+    assert spring_diagnosed(replace(above, min_gain=0.5 * above.min_gain)).effects
 
 
 @pytest.mark.slow
 def test_what_may_be_left_over_is_obeyed():
-    none = replace(CRITERIA, least_gain=1.01, least_power=2.0)
+    none = replace(CRITERIA, min_gain=1.01, min_power=2.0)
     share = spring_diagnosed(none).dependences[0].explained
     lenient = replace(none, remainder=min(1.5 * share, 1.01), remainder_to_noise=1e3)
     # What may be left over is nothing in particular, and what surely repeats no noise either.
     assert spring_diagnosed(lenient).verdict == "undecided"
-    assert spring_diagnosed(replace(lenient, least_remainder=1.0, least_colour=1.0)).verdict == "complete"
+    assert spring_diagnosed(replace(lenient, min_remainder=1.0, min_colour=1.0)).verdict == "complete"
     assert spring_diagnosed(replace(lenient, remainder=0.5 * lenient.remainder)).verdict == "unexplained"
 
 
@@ -143,7 +143,7 @@ def lines_of(added, criteria: SelectionCriteria) -> set[str]:
         (lambda motion: 0.01 * np.sin(137.0 * motion.q[1]), "torque_ripple", {"highest_order": 1.0}),
         (lambda motion: 0.01 * np.sin(137.0 * motion.q[1]), "torque_ripple", {"lowest_order": 2.0}),
         # 3 Hz are 36 periods in 12 s.
-        (lambda motion: 0.02 * np.sin(6.0 * np.pi * motion.time), "vibration", {"least_line_periods": 60.0}),
+        (lambda motion: 0.02 * np.sin(6.0 * np.pi * motion.time), "vibration", {"min_line_periods": 60.0}),
         (lambda motion: 0.02 * np.sin(6.0 * np.pi * motion.time), "vibration", {"line_significance": 1e-300}),
     ],
 )
@@ -159,7 +159,7 @@ def test_what_signals_explain_follows_bins_shrinkage_and_parts(name: str, factor
     runs = exact_runs(1, 4)
     residuals = residuals_of(step_beside(runs).scene.value, with_torque(runs, 1, lambda m: 0.02 * np.sin(6.0 * m.q[1])))
     value = getattr(CRITERIA, name)
-    criteria = replace(CRITERIA, least_per_bin=1)
+    criteria = replace(CRITERIA, min_per_bin=1)
     changed = replace(criteria, **{name: type(value)(factor * value)})
     found, other = screen(complete(), residuals, criteria), screen(complete(), residuals, changed)
     assert {item.signals for item in found} == {item.signals for item in other}
@@ -169,7 +169,7 @@ def test_what_signals_explain_follows_bins_shrinkage_and_parts(name: str, factor
 def test_a_signal_says_nothing_with_too_few_samples_in_a_bin():
     residuals = residuals_of(step_beside(exact_runs()).scene.value, exact_runs())
     assert screen(complete(), residuals)
-    assert screen(complete(), residuals, replace(CRITERIA, least_per_bin=1000)) == ()
+    assert screen(complete(), residuals, replace(CRITERIA, min_per_bin=1000)) == ()
 
 
 def test_every_criterion_is_read_somewhere():

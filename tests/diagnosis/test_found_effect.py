@@ -103,7 +103,7 @@ def test_less_than_a_sample_that_removes_little_is_corrected_and_not_counted() -
     late = [shifted(run, -samples / RATE) for run in runs]
     found = diagnose(load_robot(), late, bands=BANDS, catalogue=effects_named("time_delay"))
     (step,) = found.search.steps
-    assert 0.0 < step.decision.gain < CRITERIA.least_gain
+    assert 0.0 < step.decision.gain < CRITERIA.min_gain
     assert found.search.correction is not None
     assert found.search.correction.value[0] == pytest.approx(samples / RATE, rel=0.25)
     assert (found.effects, found.verdict) == ((), "complete")

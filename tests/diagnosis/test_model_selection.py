@@ -180,7 +180,7 @@ def test_an_effect_that_stands_for_one_outside_the_catalogue_is_not_counted() ->
     assert variation is not None
     variation = variation if offsets is None else variation.without_offsets
     share = (before**2 - after**2) / (before**2 - variation.mean_squares(beside.training.joints)[1] - noise**2)
-    assert share < CRITERIA.least_of_repeatable
+    assert share < CRITERIA.min_of_repeatable
     assert abs(float(refused.why.split("remove ")[1].split("%")[0]) - 100.0 * share) < 2.0
 
 

@@ -47,7 +47,7 @@ def test_nothing_is_demoted_where_the_rest_is_noise() -> None:
     # Had a little been left that repeats, an effect that removes most of what repeats would stay all the same.
     little = replace(outcome, repeating=frozenset({"joint1"}))
     assert proxies(little, CRITERIA) == []
-    (proxy,) = proxies(little, replace(CRITERIA, least_of_repeatable=1.5))
+    (proxy,) = proxies(little, replace(CRITERIA, min_of_repeatable=1.5))
     assert proxy.label == "asymmetric_friction of joint1"
     # What runs differ by does not repeat: an effect need not remove it.
     assert little.after.variation is None or not little.after.variation
@@ -55,8 +55,8 @@ def test_nothing_is_demoted_where_the_rest_is_noise() -> None:
     differ = RunVariation(tuple(_always_off(outcome, joint, size) for joint, size in enumerate(off)))
     assert differ.mean_squares(outcome.training.joints) == pytest.approx(np.square(off))
     varied = replace(little, after=replace(little.after, variation=differ))
-    assert proxies(varied, replace(CRITERIA, least_of_repeatable=1.5)) == []
-    assert proxies(replace(outcome, repeating=frozenset({"joint2"})), replace(CRITERIA, least_of_repeatable=1.5)) == []
+    assert proxies(varied, replace(CRITERIA, min_of_repeatable=1.5)) == []
+    assert proxies(replace(outcome, repeating=frozenset({"joint2"})), replace(CRITERIA, min_of_repeatable=1.5)) == []
     # What is judged as left is what is kept.
     for joint, after in zip(lack_of_fit(outcome.residuals), outcome.fit_after, strict=True):
         assert joint == after
@@ -69,7 +69,7 @@ def test_an_effect_may_stand_for_what_repeats_at_all_frequencies_alike() -> None
     once = searched(runs, Spring(), bands=(11.0, 11.0))
     assert found(SimpleNamespace(search=once)) == {"spring of joint1"}
     outcome = selected(runs, Spring(), bands=(11.0, 11.0), free=False)
-    assert coloured_shares(outcome.residuals)[0] < CRITERIA.least_colour
+    assert coloured_shares(outcome.residuals)[0] < CRITERIA.min_colour
     assert outcome.repeating == {"joint1"}
     assert found(outcome) == set()
     (demoted,) = outcome.demoted

@@ -243,20 +243,20 @@ def test_the_pages_of_the_diagnosis_list_every_alias_and_the_limits_of_the_progr
     page = "".join((DOCS / name).read_text(encoding="utf-8") for name in ("diagnosis.md", "decisions.md"))
     assert [alias.effect for alias in HIDDEN if f"`{alias.effect}`" not in page] == []
     for said in (
-        f"| lies outside the model | at least {CRITERIA.least_outside:.0e} ",
+        f"| lies outside the model | at least {CRITERIA.min_outside:.0e} ",
         f"| significant | p times candidates tried below {100 * CRITERIA.family_error:g} % |",
-        f"| gain on data not fitted to | at least {100 * CRITERIA.least_gain:g} % ",
-        f"| helps in | at least {100 * CRITERIA.least_votes:g} % ",
-        f"| larger than its uncertainty | by {CRITERIA.least_size:g} standard deviations",
-        f"| larger than its final uncertainty | by {CRITERIA.least_final_size:g} standard deviations",
-        f"at most {100 * CRITERIA.least_colour:g} % of its power within the band",
-        f"significant if they removed {100 * CRITERIA.least_power:g} % of",
+        f"| gain on data not fitted to | at least {100 * CRITERIA.min_gain:g} % ",
+        f"| helps in | at least {100 * CRITERIA.min_votes:g} % ",
+        f"| larger than its uncertainty | by {CRITERIA.min_size:g} standard deviations",
+        f"| larger than its final uncertainty | by {CRITERIA.min_final_size:g} standard deviations",
+        f"at most {100 * CRITERIA.min_colour:g} % of its power within the band",
+        f"significant if they removed {100 * CRITERIA.min_power:g} % of",
         f"at most {CRITERIA.worse_held_out:g} times that of the training",
         f"explain by over {100 * CRITERIA.remainder_of_runs:g} % of the squared residual (else {100 * CRITERIA.remainder:g} %)",
         f"removes as much as is asked with p at most {100 * CRITERIA.significant:g} % over all tried",
         f"stands out by at least {100 * CRITERIA.colour_of_remainder:g} %",
-        f"At most {CRITERIA.most_effects} effects per joint, and as many of the whole arm",
-        f"at least {100 * CRITERIA.least_share:g} % of what it removes",
+        f"At most {CRITERIA.max_effects} effects per joint, and as many of the whole arm",
+        f"at least {100 * CRITERIA.min_share:g} % of what it removes",
     ):
         assert said in " ".join(page.split()), said
     assert CRITERIA.alike == 2.0

@@ -72,7 +72,7 @@ def test_a_stiffness_with_an_open_end_is_not_called_settled(share: float):
         told = family.told({"stiffness": Parameter(5000.0, 5000.0 * part, "N m/rad"), "frequency": frequency})
         ends = told["stiffness"].interval
         opened.append(ends is not None and not np.all(np.isfinite(ends)))
-        assert not (opened[-1] and told_size(family, told, CRITERIA.least_size))
+        assert not (opened[-1] and told_size(family, told, CRITERIA.min_size))
     assert any(opened) == (share > 0.0)
 
 

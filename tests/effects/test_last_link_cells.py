@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scara_ident.effects.last_link_cells import MOST_CELLS, Cells, cells_of, duration_of
+from scara_ident.effects.last_link_cells import MAX_CELLS, Cells, cells_of, duration_of
 from scara_ident.effects.recording_groups import rows_of_last_link
 from scara_ident.effects.signals import Scene
 from scara_ident.model.offsets import offset_columns
@@ -96,7 +96,7 @@ def test_weights_are_one_over_what_least_squares_leaves(known: tuple[Scene, Cell
 
 def test_there_are_only_so_many_cells_and_offsets_are_of_each_recording(known: tuple[Scene, Cells, list[np.ndarray]]):
     scene, cells, _ = known
-    assert sum(len(item.bounds) - 1 for item in cells.each) <= MOST_CELLS
+    assert sum(len(item.bounds) - 1 for item in cells.each) <= MAX_CELLS
     for column in offset_columns(scene.model):
         # What each recording has of its own the base model has no more.
         assert column is None or cells.aim[column] == pytest.approx(0.0, abs=1e-9 * np.max(np.abs(cells.aim)))

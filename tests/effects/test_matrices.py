@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scara_ident.effects.matrices import LEAST_EIGENVALUE, definite, inverse, times
+from scara_ident.effects.matrices import MIN_EIGENVALUE, definite, inverse, times
 
 
 def test_matrices_times_their_inverses_leave_vectors_as_they_are():
@@ -32,8 +32,8 @@ def test_eigenvalues_are_asked_of_those_mass_matrices_alone_that_are_nearly_sing
     asked, solve = [], np.linalg.eigvalsh
     monkeypatch.setattr(np.linalg, "eigvalsh", lambda matrices: asked.append(len(matrices)) or solve(matrices))
     found = definite(inertia)
-    assert asked == [np.count_nonzero(least <= LEAST_EIGENVALUE)] and 0 < asked[0] < 100
+    assert asked == [np.count_nonzero(least <= MIN_EIGENVALUE)] and 0 < asked[0] < 100
     scaled = np.moveaxis(found / (size[:, None] * size), 2, 0)
-    assert solve(scaled)[:, 0].min() > 0.99 * LEAST_EIGENVALUE
-    good = least > LEAST_EIGENVALUE
+    assert solve(scaled)[:, 0].min() > 0.99 * MIN_EIGENVALUE
+    good = least > MIN_EIGENVALUE
     np.testing.assert_array_equal(found[..., good], inertia[..., good])

@@ -10,8 +10,8 @@ from numpy.testing import assert_allclose
 
 from scara_ident.effects import Member
 from scara_ident.effects.measurement import TimeDelay
-from scara_ident.effects.recording_delays import MOST_RECORDINGS, DelayOfEachRecording
-from scara_ident.estimation.run_variation import LEAST_RUNS
+from scara_ident.effects.recording_delays import MAX_RECORDINGS, DelayOfEachRecording
+from scara_ident.estimation.run_variation import MIN_RUNS
 from scara_ident.robot.robot import load_robot
 from tests.effects.scenes import columns, moving, scene_of
 
@@ -38,8 +38,8 @@ def test_each_recording_has_a_column_that_is_zero_in_all_others():
 
 
 def test_it_is_tried_where_recordings_are_enough_and_not_too_many():
-    names = [f"r_{k}" for k in range(MOST_RECORDINGS + 1)]
-    assert [bool(EFFECT.members(scene(*names[:count]))) for count in (LEAST_RUNS - 1, LEAST_RUNS)] == [False, True]
+    names = [f"r_{k}" for k in range(MAX_RECORDINGS + 1)]
+    assert [bool(EFFECT.members(scene(*names[:count]))) for count in (MIN_RUNS - 1, MIN_RUNS)] == [False, True]
     assert [bool(EFFECT.members(scene(*names[:count]))) for count in (-1, None)] == [True, False]
 
 

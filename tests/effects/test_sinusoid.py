@@ -8,7 +8,7 @@ import pytest
 from scara_ident.effects import Member
 from scara_ident.effects.periodic import TorqueRipple
 from scara_ident.effects.signals import Signals
-from scara_ident.effects.sinusoid import amplitude_and_phase, least_amplitude, sine_and_cosine, sines
+from scara_ident.effects.sinusoid import amplitude_and_phase, min_amplitude, sine_and_cosine, sines
 from scara_ident.robot.robot import load_robot
 from tests.effects.scenes import moving, scene_of
 
@@ -42,7 +42,7 @@ def test_both_coefficients_are_named_and_reported_in_the_unit_of_the_columns():
 
 
 def test_an_amplitude_is_believed_two_deviations_smaller():
-    assert least_amplitude(np.array([3.0, 4.0]), np.array([0.1, 0.2])) == pytest.approx(4.6)
+    assert min_amplitude(np.array([3.0, 4.0]), np.array([0.1, 0.2])) == pytest.approx(4.6)
 
 
 @pytest.mark.parametrize("order", [0.5, 1.0, 2.5, 12.0])

@@ -295,7 +295,7 @@ def test_neighbouring_blocks_beyond_the_parts_that_are_looked_at_count_as_one():
     w = smooth_columns(rng, 2400, 20)
     u = w @ np.ones(20) + coloured(rng, 2400)
     found = [estimated(joint_rows(w, u, length))[1] for length in (100, 200)]
-    assert [item.blocks for item in found] == [2 * covariance.MOST_PARTS, covariance.MOST_PARTS]
+    assert [item.blocks for item in found] == [2 * covariance.MAX_PARTS, covariance.MAX_PARTS]
     np.testing.assert_allclose(found[0].matrix, found[1].matrix, rtol=1e-9)
 
 

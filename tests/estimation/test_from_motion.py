@@ -8,13 +8,13 @@ from numpy.testing import assert_allclose
 
 from scara_ident import Motion, build_model, load_robot
 from scara_ident.errors import RecordingError
-from scara_ident.estimation.from_motion import LEAST_CHUNK, MOST_CHUNK, chunk_of, information_of
+from scara_ident.estimation.from_motion import MAX_CHUNK, MIN_CHUNK, chunk_of, information_of
 from scara_ident.estimation.information import merge
 
 
 def test_chunks_give_what_all_rows_at_once_give():
     model = build_model(load_robot(), "complete")
-    assert LEAST_CHUNK < chunk_of(model) <= MOST_CHUNK
+    assert MIN_CHUNK < chunk_of(model) <= MAX_CHUNK
     samples = 2 * chunk_of(model) + 700
     random = np.random.default_rng(0)
     q, v, a, torque = random.uniform(-2.0, 2.0, (4, 2, samples))

@@ -137,7 +137,7 @@ def test_of_more_than_is_held_noise_is_drawn_group_by_group(monkeypatch):
     seen = observed(coarse(13), WIDE)
     once = wls(seen).noise_bias
     assert once is not None
-    monkeypatch.setattr(sample_columns, "MOST_VALUES", 2 * max(part.samples for part in seen.data.stretches))
+    monkeypatch.setattr(sample_columns, "MAX_VALUES", 2 * max(part.samples for part in seen.data.stretches))
     many = observed(coarse(13), WIDE)
     bias = wls(many).noise_bias
     assert bias is not None

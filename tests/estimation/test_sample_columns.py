@@ -15,14 +15,14 @@ from tests.diagnosis.made import exact_runs, observed
 
 @pytest.fixture
 def nothing_held(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sample_columns, "MOST_VALUES", 1)
+    monkeypatch.setattr(sample_columns, "MAX_VALUES", 1)
 
 
 def test_few_samples_are_held_and_many_are_not(monkeypatch: pytest.MonkeyPatch):
     seen = observed(exact_runs())
     assert few_enough(seen.data)
     assert all(held is not None for held in seen.raw.held)
-    monkeypatch.setattr(sample_columns, "MOST_VALUES", seen.samples * 2 - 1)
+    monkeypatch.setattr(sample_columns, "MAX_VALUES", seen.samples * 2 - 1)
     assert not few_enough(seen.data)
     assert observed(exact_runs()).raw.held == (None,) * len(exact_runs())
 
@@ -41,7 +41,7 @@ def test_what_is_made_anew_is_what_would_be_held(nothing_held: None):
 def test_predictions_and_errors_are_the_same(monkeypatch: pytest.MonkeyPatch):
     held = observed(exact_runs())
     value = wls(held).value
-    monkeypatch.setattr(sample_columns, "MOST_VALUES", 1)
+    monkeypatch.setattr(sample_columns, "MAX_VALUES", 1)
     anew = observed(exact_runs())
     for mine, other in zip(held.predicted(value), anew.predicted(value), strict=True):
         assert np.array_equal(mine, other)
@@ -54,7 +54,7 @@ def test_an_identification_is_the_same(monkeypatch: pytest.MonkeyPatch):
     runs = exact_runs()
     robot = observed(runs).model.robot
     held = identify(robot, runs[:-1], validation=runs[-1:])
-    monkeypatch.setattr(sample_columns, "MOST_VALUES", 1)
+    monkeypatch.setattr(sample_columns, "MAX_VALUES", 1)
     anew = identify(robot, runs[:-1], validation=runs[-1:])
     assert np.array_equal(held.estimate.value, anew.estimate.value)
     assert np.array_equal(held.estimate.std, anew.estimate.std)

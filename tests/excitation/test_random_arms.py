@@ -46,7 +46,7 @@ def random_arm(random: np.random.Generator, reductions: bool, folder: Path) -> R
     return load_robot(write_urdf(folder / "arm.urdf", links, ratios))
 
 
-def least_height(robot: Robot, q: np.ndarray) -> float:
+def min_height(robot: Robot, q: np.ndarray) -> float:
     """Least height of the balls over all samples."""
     model, data, back = robot.model, robot.model.createData(), np.argsort(robot.order)
     coms = [inertia.lever for inertia in model.inertias][1:]
@@ -151,7 +151,7 @@ def keep_limits(robot, seed, criterion, family, share, acceleration):
     speed, push = tool_by_pinocchio(robot, q[:, some], v[:, some], a[:, some])
     assert np.max(push) <= acceleration
     if "floor" in watched.groups:
-        assert least_height(robot, q[:, some]) >= FLOOR + MARGIN
+        assert min_height(robot, q[:, some]) >= FLOOR + MARGIN
     assert np.max(speed) <= 2.0
     # More motion always tells more in all; a condition or a block may have its best within the limits.
     if criterion == "logdet":

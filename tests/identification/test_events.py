@@ -11,7 +11,7 @@ import pytest
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.estimation.robust import robust_fit
 from scara_ident.identification.events import (
-    MOST_SAID,
+    MAX_SENTENCES,
     Event,
     event_notes,
     find_events,
@@ -148,12 +148,12 @@ def test_of_a_recording_explained_worse_for_no_known_reason_none_is_given():
 
 
 def test_of_very_many_events_the_strongest_are_said():
-    scores = np.random.default_rng(0).permutation(MOST_SAID + 5)
+    scores = np.random.default_rng(0).permutation(MAX_SENTENCES + 5)
     events = [
         Event("a", float(k), k + 0.5, ("joint1",), 1.0, "unknown", float(score)) for k, score in enumerate(scores)
     ]
     notes = event_notes(ROBOT, events)
-    assert len(notes) == MOST_SAID + 1
+    assert len(notes) == MAX_SENTENCES + 1
     assert notes[:-1] == [event.sentence(ROBOT) for event in events if event.score >= 5.0]
     assert notes[-1] == "5 more events are listed in the result"
     assert event_notes(ROBOT, events[:2]) == [event.sentence(ROBOT) for event in events[:2]]

@@ -42,7 +42,7 @@ def names(data: PreparedData) -> list[str]:
 
 
 def hold(monkeypatch: pytest.MonkeyPatch, recordings: float) -> None:
-    monkeypatch.setattr(module, "MOST_VALUES", int(2 * SAMPLES * recordings))
+    monkeypatch.setattr(module, "MAX_VALUES", int(2 * SAMPLES * recordings))
 
 
 def test_what_is_not_too_much_stays_as_it_is(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:

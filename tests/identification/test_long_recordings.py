@@ -24,7 +24,7 @@ BANDS = [8.0, 8.0]
 
 @pytest.fixture(autouse=True)
 def _short_pieces(monkeypatch):
-    monkeypatch.setattr(long_file, "MOST_SAMPLES", 2_000)
+    monkeypatch.setattr(long_file, "MAX_SAMPLES", 2_000)
     monkeypatch.setattr(long_file, "PART", 5_000)
 
 
@@ -91,7 +91,7 @@ def test_what_is_held_does_not_grow_and_all_samples_count_though_few_are_kept(ru
     whole = identify(ROBOT, path, bands=BANDS)
     monkeypatch.setattr(long_file, "KEPT", 4_500)
     monkeypatch.setattr(long_file, "WINDOWS", 3)
-    monkeypatch.setattr(long_recordings, "MOST_BLOCKS", 20)
+    monkeypatch.setattr(long_recordings, "MAX_BLOCKS", 20)
     kept = in_parts(monkeypatch, path)
     assert len(kept.time) == 4_500
     parts = identify(ROBOT, kept, bands=BANDS)

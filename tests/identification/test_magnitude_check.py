@@ -76,7 +76,7 @@ def test_one_sign_of_a_load_is_no_magnitude(robot: Robot, load: float, monkeypat
         # What is explained is not searched; were it, signs would explain it no better.
         assert signed_fits(observations) == {}
         with monkeypatch.context() as patched:
-            patched.setattr(magnitude_check, "LEAST_LEFT", 0.0)
+            patched.setattr(magnitude_check, "MIN_UNEXPLAINED", 0.0)
             assert list(signed_fits(observations)) == [0, 1]
             assert channel_faults(observations) == ()
 

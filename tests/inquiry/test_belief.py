@@ -57,8 +57,8 @@ def let_in(model: FittedModel, own: np.ndarray, size: float, draws: int = 100) -
         (found,) = examine(now, [{0: own}])
         (gain,) = gains(now, [{0: own}], [0], [found])
         helps, voting = found.votes
-        sure = found.p_value * TRIED <= CRITERIA.family_error and gain >= CRITERIA.least_gain
-        count += sure and helps >= CRITERIA.least_votes * voting
+        sure = found.p_value * TRIED <= CRITERIA.family_error and gain >= CRITERIA.min_gain
+        count += sure and helps >= CRITERIA.min_votes * voting
     return count / draws
 
 
@@ -151,7 +151,7 @@ def test_what_another_effect_does_nearly_as_well_is_not_told_from_it():
     torque = near @ np.array(suspects[0].value)
     left = [np.sum((torque - a @ np.linalg.lstsq(a, torque)[0]) ** 2) for a in (model, np.hstack([model, tilt]))]
     assert left[1] < 0.5 * left[0]
-    expected = max(left[1] / (2.0 * CRITERIA.alike) ** 2, left[1] / ((1.0 - CRITERIA.least_share) * left[0]))
+    expected = max(left[1] / (2.0 * CRITERIA.alike) ** 2, left[1] / ((1.0 - CRITERIA.min_share) * left[0]))
     assert apart(np.hstack([model, near, tilt])) == pytest.approx(np.sqrt(expected), rel=1e-9)
     assert apart(np.hstack([model, 40.0 * tilt[:, :1], tilt])) == pytest.approx(0.0, abs=1e-6)
 

@@ -114,7 +114,7 @@ def test_a_sentence_begins_with_a_capital_unless_it_begins_with_a_name():
 def test_what_noise_makes_on_a_joint_that_hardly_moves_asks_to_move_it():
     """Its experiment would show as little of it, and a finer encoder is not what lacks."""
     runs = with_torque(exact_runs(size=0.05), 1, lambda motion: 0.3 * motion.q[1])
-    strict = replace(CRITERIA, least_votes=1.01)
+    strict = replace(CRITERIA, min_votes=1.01)
     found = diagnose(load_robot(), runs, bands=BANDS, catalogue=(Spring(),), criteria=strict)
     (decision,) = (item for item in found.search.decisions if item.label == "spring of joint2")
     assert decision.examination.p_value * found.search.tried < strict.family_error

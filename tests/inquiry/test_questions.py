@@ -12,7 +12,7 @@ from scara_ident.diagnosis import Unexplained
 from scara_ident.errors import UsageError
 from scara_ident.files import plain
 from scara_ident.inquiry.questions import (
-    MOST_ODDS,
+    MAX_ODDS,
     odds_of,
     question_of,
     questions,
@@ -53,7 +53,7 @@ def test_an_effect_of_a_file_that_is_not_installed_is_said():
 def test_a_p_value_speaks_for_an_effect_as_much_as_it_can():
     # Table 1 of Sellke, Bayarri and Berger 2001: odds of none of .870, .407 and .125.
     assert [1.0 / odds_of(p) for p in (0.2, 0.05, 0.01)] == pytest.approx([0.870, 0.407, 0.125], abs=6e-3)
-    assert odds_of(0.9) == pytest.approx(1.0) and odds_of(0.0) == odds_of(1e-30) == MOST_ODDS
+    assert odds_of(0.9) == pytest.approx(1.0) and odds_of(0.0) == odds_of(1e-30) == MAX_ODDS
     # What cannot be there as it was found may be there with the other sign, and nothing speaks for it.
     found = open_diagnosis()
     (decision,) = [item for item in found.search.decisions if item.label == "spring of joint2"][:1]
@@ -71,7 +71,7 @@ def test_what_the_noise_of_positions_makes_does_not_rank_first(seed: int):
     suspects = [item for question in questions(found) for item in question.suspects]
     assert {item.label for item in suspects} == {"joint_elasticity of joint1", "joint_elasticity of joint2"}
     # Before it was taken off, as many as there can be.
-    assert max(item.odds for item in suspects) < 0.25 * MOST_ODDS
+    assert max(item.odds for item in suspects) < 0.25 * MAX_ODDS
 
 
 def test_of_members_of_which_nothing_is_known_that_which_takes_fewest_standard_errors_is_asked_for():

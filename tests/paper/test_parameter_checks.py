@@ -54,7 +54,7 @@ def test_friction_is_never_negative_where_it_was_measured_and_four_times_beyond(
 def test_least_friction_is_that_of_a_fine_grid(coefficients: tuple[float, float, float, float], top: float) -> None:
     speeds = np.linspace(0.0, top, 20001)[1:]
     torque = friction(speeds, coefficients)
-    least, zero = parameter_checks.least_friction(np.array(coefficients), top)
+    least, zero = parameter_checks.min_friction(np.array(coefficients), top)
     # Between grid points the torque moves by less than this.
     spacing = (1.0 + 2.0 * top + 3.0 * top**2) * top / 20000
     on_grid = min(torque.min(), coefficients[0])
@@ -69,8 +69,8 @@ def test_least_friction_is_that_of_a_fine_grid(coefficients: tuple[float, float,
 
 def test_friction_that_only_grazes_zero_does_not_drive() -> None:
     grazing = np.array([1.0, -2.0, 1.0, 0.0])  # (1 - v)^2
-    assert parameter_checks.least_friction(grazing, 3.0) == (0.0, None)
+    assert parameter_checks.min_friction(grazing, 3.0) == (0.0, None)
     through = np.array([1.0, -1.0, 0.0, 0.0])
-    least, zero = parameter_checks.least_friction(through, 3.0)
+    least, zero = parameter_checks.min_friction(through, 3.0)
     assert least == -2.0
     assert zero == pytest.approx(1.0, rel=1e-14)

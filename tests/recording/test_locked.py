@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scara_ident.recording.locked import MOST_TRAVEL, locked_channels, moving_though_locked
+from scara_ident.recording.locked import MAX_TRAVEL, locked_channels, moving_though_locked
 from scara_ident.recording.recording import read_recording
 from scara_ident.robot.description import RobotDescription
 from scara_ident.robot.robot import Robot, build_robot, embedded_urdf
@@ -32,7 +32,7 @@ def test_a_joint_that_moves_though_it_is_locked_is_named_with_its_column(first_j
     assert "joint2 is locked at 0.5 in the model" in finding.message
 
 
-@pytest.mark.parametrize("travel", [0.0, 0.9 * MOST_TRAVEL, None])
+@pytest.mark.parametrize("travel", [0.0, 0.9 * MAX_TRAVEL, None])
 def test_nothing_is_said_where_it_stands_or_has_no_column(first_joint: Robot, tmp_path, travel: float | None):
     made = columns(200)
     if travel is None:

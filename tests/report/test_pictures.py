@@ -17,7 +17,7 @@ from scara_ident.report.html.diagnosis import DiagnosisContext, diagnosis_report
 from scara_ident.report.html.identification import IdentificationContext
 from scara_ident.report.html.remainder import signal_of
 from scara_ident.report.pictures import (
-    MOST_RECORDINGS,
+    MAX_RECORDINGS,
     design_figures,
     design_picture,
     diagnosis_pictures,
@@ -96,7 +96,7 @@ def test_held_out_runs_are_drawn_first_and_not_too_many(tmp_path: Path, monkeypa
     fit, held = [run(f"OJD_{k}", k, seconds=6.0) for k in range(1, 5)], [run("CI_1", 9, seconds=6.0)]
     torque_picture(tmp_path / "torque.png", IdentificationContext(made(fit, held)))
     assert said[1:3] == ["CI_1 (held out), joint1", "OJD_1 (fitted), joint1"]
-    assert sum("joint2" in text for text in said) == MOST_RECORDINGS
+    assert sum("joint2" in text for text in said) == MAX_RECORDINGS
     for color in ("blue", "vermillion", "green"):
         assert share(tmp_path / "torque.png", color) > 2e-4
 

@@ -10,7 +10,7 @@ import pytest
 from scara_ident.errors import LostArm, UsageError
 from scara_ident.simulation import VirtualArm, parse_effect, simulate
 from scara_ident.simulation.plant import PlantDraft
-from scara_ident.simulation.true_motion import MOST_SUBSTEPS, needed_substeps
+from scara_ident.simulation.true_motion import MAX_SUBSTEPS, needed_substeps
 from tests.simulation.made import bare, rigid, scara, swing
 
 
@@ -47,7 +47,7 @@ def test_a_stiffer_gear_takes_finer_steps_as_the_root_of_its_stiffness() -> None
 
 def test_what_would_take_for_ever_is_refused_with_the_joint_and_what_to_do() -> None:
     arm = scara()
-    with pytest.raises(UsageError, match=f"^joint2: so stiff that .*at most {MOST_SUBSTEPS}.*; lower its stiffness"):
+    with pytest.raises(UsageError, match=f"^joint2: so stiff that .*at most {MAX_SUBSTEPS}.*; lower its stiffness"):
         needed_substeps(arm, drafted(arm, "joint_elasticity:joint2:stiffness=1e12"), 1000.0)
 
 

@@ -70,11 +70,11 @@ def test_an_arm_that_is_lost_in_few_steps_is_tried_in_more(monkeypatch: pytest.M
     """Wrists of a UR10 with 2.5 N m of friction and an inertia of 0.001 kg m^2 were lost at two steps a sample."""
     tried: list[int] = []
 
-    def coarse(*given: Any, least_substeps: int, **more: Any) -> SimulationResult:
-        tried.append(least_substeps)
-        if least_substeps == SUBSTEPS:
+    def coarse(*given: Any, min_substeps: int, **more: Any) -> SimulationResult:
+        tried.append(min_substeps)
+        if min_substeps == SUBSTEPS:
             raise LostArm("lost")
-        return simulate(*given, least_substeps=least_substeps, **more)
+        return simulate(*given, min_substeps=min_substeps, **more)
 
     monkeypatch.setattr(tracking, "simulate", coarse)
     arm = ideal(scara())

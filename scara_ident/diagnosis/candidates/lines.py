@@ -122,7 +122,7 @@ def lines_in_time(
         Hz above which the residuals have nothing.
     """
     width = frequency_width(residuals, rate)
-    lowest = criteria.least_line_periods * 0.5 * width
+    lowest = criteria.min_line_periods * 0.5 * width
     if highest < NARROWEST_RANGE * lowest:
         return []
     frequencies = np.arange(lowest, highest, width / POINTS_PER_WIDTH)

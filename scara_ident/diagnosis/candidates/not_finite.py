@@ -10,7 +10,7 @@ from scara_ident.errors import ScaraIdentError
 from scara_ident.manners import listed
 
 # Joints and recordings that a line names.
-MOST_NAMED = 4
+MAX_NAMED = 4
 
 
 def without_not_finite(
@@ -39,9 +39,9 @@ def without_not_finite(
         recordings.update(dict.fromkeys(names))
     notes = []
     for (name, wholly), (joints, recordings) in told.items():
-        label = f"{name} of {listed(list(joints), MOST_NAMED)}"
+        label = f"{name} of {listed(list(joints), MAX_NAMED)}"
         some = {item.name for item in columns.observations.data.recordings} - set(recordings)
-        place = listed(list(recordings), MOST_NAMED) if some else "any recording"
+        place = listed(list(recordings), MAX_NAMED) if some else "any recording"
         mend = ["correct the effect", *([f"leave out {place}"] if some else [])]
         if wholly and asked_for:
             mend.append("do not ask for it")

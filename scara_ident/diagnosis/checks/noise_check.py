@@ -65,13 +65,13 @@ def made_by_noise(step: SelectionStep, decision: Decision) -> str | None:
         # What is no smaller without the noise was not made by it.
         return None
     p_value = _left_of(found, left).p_value
-    if share < criteria.least_without_noise:
+    if share < criteria.min_without_noise:
         return f"{BY_NOISE} makes it: with that taken off {share:.0%} of it is left, p = {p_value:.1e}"
     # Believed as it is, it may pass what is asked by little, so that most of it need not pass. Of a correction less is asked.
-    if decision.gain * share < criteria.least_gain <= decision.gain:
+    if decision.gain * share < criteria.min_gain <= decision.gain:
         return (
             f"{BY_NOISE} helps it over the detection limit: with that taken off, {share:.1%} of it is left, which "
-            f"removes {decision.gain * share:.2%} of the squared residual, {criteria.least_gain:.0%} is asked"
+            f"removes {decision.gain * share:.2%} of the squared residual, {criteria.min_gain:.0%} is asked"
         )
     if p_value * step.tried > criteria.family_error:
         return (

@@ -16,7 +16,7 @@ from scara_ident.diagnosis.candidates.candidates import Candidate, CandidateColu
 from scara_ident.diagnosis.checks.same_errors import same
 from scara_ident.diagnosis.fitting.effect_parameters import physical_parameters, told_size
 from scara_ident.diagnosis.fitting.linearised import linearise
-from scara_ident.diagnosis.fitting.nonlinear_fit import LEAST_FALL, RISE, tune
+from scara_ident.diagnosis.fitting.nonlinear_fit import MIN_DECREASE, RISE, tune
 from scara_ident.diagnosis.fitting.part_of_recordings import on_all, on_part
 from scara_ident.diagnosis.testing.selection_step import SelectionStep
 from scara_ident.effects import Parameter
@@ -39,7 +39,7 @@ class _Fit:
 
     def near(self, other: _Fit) -> bool:
         """Whether it may come down to the error of another fit."""
-        return self.error < (1.0 + LEAST_FALL) * other.error
+        return self.error < (1.0 + MIN_DECREASE) * other.error
 
 
 def lowest(step: SelectionStep) -> SelectionStep:
@@ -92,7 +92,7 @@ def quieter(step: SelectionStep) -> SelectionStep | None:
     if below is None or noisy(below.observations.data, OF_LAG) or not _moved_by_noise(step, below, places):
         return None
     told = zip(below.chosen, physical_parameters(below).effects, strict=True)
-    return below if all(told_size(item.effect, own, step.criteria.least_final_size) for item, own in told) else None
+    return below if all(told_size(item.effect, own, step.criteria.min_final_size) for item, own in told) else None
 
 
 def _together(step: SelectionStep) -> list[int]:

@@ -35,10 +35,10 @@ def remainder_objection(step: SelectionStep, decision: Decision) -> str | None:
     )
     share = (left - float(np.sum(both.model.squares))) / (before - own) if own < before else 0.0
     # What has nothing to do with it removes as much with it as without.
-    if share >= step.criteria.least_beside_rest:
+    if share >= step.criteria.min_beside_rest:
         return None
     what = step.rest.effect.description(step.scene, step.rest.member)
-    if before - left >= step.criteria.least_share * (before - own):
+    if before - left >= step.criteria.min_share * (before - own):
         return f"{what} does as well in its place, and beside it {max(share, 0.0):.0%} of this is left"
     (again,) = both.without(len(rest.chosen)).judge(both.chosen[-1:])
     return None if again.accepted else f"beside {what} {max(share, 0.0):.0%} of this is left: {again.why}"

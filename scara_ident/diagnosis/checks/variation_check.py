@@ -21,11 +21,11 @@ from scara_ident.estimation.assumed_variation import (
     ASSUMED_SCALE,
     assumed_variation,
 )
-from scara_ident.estimation.run_variation import LEAST_RUNS, RunVariation
+from scara_ident.estimation.run_variation import MIN_RUNS, RunVariation
 from scara_ident.estimation.variation_between import run_variation
 
 
-def variation_objection(step: SelectionStep, decision: Decision, least_gain: float = 0.0) -> str | None:
+def variation_objection(step: SelectionStep, decision: Decision, min_gain: float = 0.0) -> str | None:
     """Say so where an effect is not significant, or removes too little, beside what runs differ by.
 
     That is what they differ by with the effect in the model, for without it they seem to differ more. Only of an effect
@@ -40,7 +40,7 @@ def variation_objection(step: SelectionStep, decision: Decision, least_gain: flo
         The model that the candidate was tried beside.
     decision : Decision
         That lets it in.
-    least_gain : float, optional
+    min_gain : float, optional
         What it must remove there, unless that is far more than runs differ by: what all runs have alike, such as the delay of
         a joint, removes little of what is left beside differences of the same kind. While others are missing runs seem to
         differ more, and nothing is asked.
@@ -58,14 +58,14 @@ def variation_objection(step: SelectionStep, decision: Decision, least_gain: flo
     if step.in_doubt(again, max(gain, decision.gain)):
         again = examine_rows(beside.model, rows[0], again)
     why = "runs differ from one another by as much: with that counted as noise"
-    if len(step.observations.data.recordings) < LEAST_RUNS:
+    if len(step.observations.data.recordings) < MIN_RUNS:
         scale = f"all torque by {ASSUMED_SCALE:.0%}, " if decision.candidate.effect.by_recording else ""
         each = f"friction by some {ASSUMED_FRICTION:.0%}, {scale}an offset by {ASSUMED_OFFSET:.0%} of its torque, a delay by "
         why = f"{each}{ASSUMED_DELAY * 1e3:g} ms: runs that differ so may do as much: with that counted as noise"
     if again.p_value * step.tried > step.criteria.family_error:
         return f"{why} p = {again.p_value:.1e}"
-    if gain < least_gain and not _dwarfs(step, decision, variation):
-        return f"{why} it removes {max(gain, 0.0):.1%} of the squared residual, {least_gain:.0%} is asked"
+    if gain < min_gain and not _dwarfs(step, decision, variation):
+        return f"{why} it removes {max(gain, 0.0):.1%} of the squared residual, {min_gain:.0%} is asked"
     return None
 
 
@@ -114,11 +114,11 @@ def best_first(pairs: Sequence[tuple[SelectionStep, Decision]]) -> list[tuple[Se
     if len(order) < 2 or _of_the_runs(order[0][1]):
         return order
     step, best = order[0]
-    enough = step.criteria.least_share * best.examination.held_out
+    enough = step.criteria.min_share * best.examination.held_out
     near = [pair for pair in order[1:] if pair[1].examination.held_out >= enough and not _of_the_runs(pair[1])]
     beside = replace(step, chosen=(*step.chosen, best.candidate))
     again = beside.judge([item.candidate for _, item in near]) if near else []
-    little = 1.0 - step.criteria.least_share
+    little = 1.0 - step.criteria.min_share
     rivals = [pair for pair, item in zip(near, again, strict=True) if _saved(beside, item) < little * _saved(*pair)]
     variation = counted(step, best).variation if rivals else None
     if variation is None:
@@ -162,7 +162,7 @@ def _variation_beside(step: SelectionStep, decision: Decision) -> RunVariation:
         value = np.concatenate([found.model_value, found.value])
         added = [*chosen, *step.columns.rows(step.scene, [decision.candidate])]
     joints = with_columns(step.observations, added)
-    if len(step.observations.data.recordings) >= LEAST_RUNS:
+    if len(step.observations.data.recordings) >= MIN_RUNS:
         return run_variation(step.observations, joints, value)
     scale = ASSUMED_SCALE if decision.candidate.effect.by_recording else 0.0
     return assumed_variation(step.observations, joints, value, scale)

@@ -19,7 +19,7 @@ from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.run_variation import JointVariation
 
 # Of fewer runs one that carries something looks as runs that differ do.
-LEAST_ALIKE = 5
+MIN_RUNS = 5
 
 
 def even_evidence(
@@ -148,7 +148,7 @@ def _as_runs_differ(
     from scipy.special import fdtrc
 
     runs = len(item.of_run)
-    if runs < LEAST_ALIKE or item.directions.shape[1] != joint.table.shape[1]:
+    if runs < MIN_RUNS or item.directions.shape[1] != joint.table.shape[1]:
         return False
     left = joint.left(value)
     rest = left - item.off

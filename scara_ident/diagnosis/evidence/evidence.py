@@ -31,7 +31,7 @@ BINS = 12
 # Share of the band in which the low-pass leaves the residual as it is.
 UNTOUCHED = 0.8
 # Noise of the positions by one draw that has more of the residual's power than this is not what it was taken for.
-MOST_KNOWN = 1.5
+MAX_POSITION_NOISE = 1.5
 # Probability below which what repeats is doubted to be noise where it is `far_above_noise`: nothing is claimed by it.
 DOUBTED = 0.05
 
@@ -93,10 +93,10 @@ def evidence(
     limits = detection_limits(found, criteria)
     coloured = coloured_shares(residuals)
     noise = np.full(len(coloured), "white noise", dtype=object)
-    if made is not None and np.any(coloured > criteria.least_colour):
+    if made is not None and np.any(coloured > criteria.min_colour):
         less = coloured_shares(residuals, made())
         # What is white is shown as it is, whatever other joints need.
-        mended = (coloured > criteria.least_colour) & (less < coloured)
+        mended = (coloured > criteria.min_colour) & (less < coloured)
         noise[mended], coloured[mended] = "white noise and that of the positions", less[mended]
     repeated = {item.joint: item for item in fit}
     # An effect found leaves something of second order, which repeats as it does.
@@ -144,7 +144,7 @@ def _of_joint(
 ) -> Evidence:
     small, of_positions, of_effects = allowed
     repeats = fit is not None and fit.p_value < criteria.significant
-    if limit > criteria.least_power:
+    if limit > criteria.min_power:
         missing = (
             "nothing missing"
             if limit >= 1.0
@@ -155,8 +155,8 @@ def _of_joint(
     if fit is not None and repeats and fit.missing > small:
         why = f"{_beside(fit, unit)}: more than filters and encoders alone leave, but too little to tell what it is"
         return Evidence(joint, False, "repetition", why, limit)
-    if fit is not None and fit.most_missing <= criteria.remainder_to_noise * fit.noise:
-        why = f"repetitions leave at most {fit.most_missing:.3g} {unit} that repeats, and {fit.noise:.3g} {unit} that does not"
+    if fit is not None and fit.max_missing <= criteria.remainder_to_noise * fit.noise:
+        why = f"repetitions leave at most {fit.max_missing:.3g} {unit} that repeats, and {fit.noise:.3g} {unit} that does not"
         return Evidence(joint, True, "repetition", why, limit)
     # What is that large beside the noise is doubted where it is hardly shown too, as of a few periods of a narrow band.
     far = fit is not None and fit.p_value < DOUBTED and fit.missing > criteria.far_above_noise * fit.noise
@@ -169,14 +169,14 @@ def _of_joint(
         why = f"{_beside(fit, unit)}: no noise, even where it is white, but filters and encoders may leave as much, "
         why += "so this alone does not say that the model lacks something"
         return Evidence(joint, False, "repetition", why, limit)
-    if coloured <= criteria.least_colour:
+    if coloured <= criteria.min_colour:
         why = f"at most {max(coloured, 0.0):.0%} of its power stands out from {noise} within the band"
         return Evidence(joint, True, "whiteness", why, limit)
     why = f"{coloured:.0%} of its power stands out from {noise} within the band, and "
     why += (
         "no trajectory is repeated that would tell whether it repeats"
         if fit is None
-        else f"up to {fit.most_missing:.3g} {unit} of it may repeat, where {fit.noise:.3g} {unit} does not"
+        else f"up to {fit.max_missing:.3g} {unit} of it may repeat, where {fit.noise:.3g} {unit} does not"
     )
     return Evidence(joint, False, "", why, limit)
 
@@ -264,7 +264,7 @@ def detection_limits(found: Search, criteria: SelectionCriteria = CRITERIA) -> A
     total = float(np.sum(found.step.model.squares))
     for decision in (*found.decisions, *(step.decision for step in found.steps)):
         examined, joint = decision.examination, decision.candidate.member.joint
-        if joint is None or examined.outside < criteria.least_outside or total == 0.0:
+        if joint is None or examined.outside < criteria.min_outside or total == 0.0:
             continue
         count = len(examined.value)
         rest = examined.freedom - count + 1.0
@@ -274,10 +274,10 @@ def detection_limits(found: Search, criteria: SelectionCriteria = CRITERIA) -> A
         quantile = float(fdtri(count, rest, 1.0 - criteria.family_error / found.tried)) * examined.freedom / rest
         noise = float(np.trace(examined.products @ examined.covariance))
         shares[joint].append(min(1.0, quantile * noise / total * robot.n))
-    return np.array([max(float(np.median(item)), criteria.least_gain) if item else np.nan for item in shares])
+    return np.array([max(float(np.median(item)), criteria.min_gain) if item else np.nan for item in shares])
 
 
-def least_found(found: Search, decision: Decision, criteria: SelectionCriteria = CRITERIA) -> Mapping[str, Parameter]:
+def min_found(found: Search, decision: Decision, criteria: SelectionCriteria = CRITERIA) -> Mapping[str, Parameter]:
     """Return the size that an effect of one coefficient would have to have to come in; none for others.
 
     It must be significant, and remove as much of what is left on its joint as is asked. The standard deviation says nothing.
@@ -288,11 +288,11 @@ def least_found(found: Search, decision: Decision, criteria: SelectionCriteria =
         On one of the candidates at the end.
     """
     examined, candidate, scene = decision.examination, decision.candidate, found.scene
-    if len(examined.value) != 1 or examined.outside < criteria.least_outside or not examined.products[0, 0] > 0.0:
+    if len(examined.value) != 1 or examined.outside < criteria.min_outside or not examined.products[0, 0] > 0.0:
         return {}
     errors = needed(1, examined.freedom, criteria.family_error / found.tried)
     left = float(np.sum(found.step.model.squares)) / (1 if candidate.member.joint is None else scene.robot.n)
-    share = criteria.least_gain / (1.0 - criteria.least_gain)
+    share = criteria.min_gain / (1.0 - criteria.min_gain)
     size = max(errors * np.sqrt(examined.covariance[0, 0]), np.sqrt(share * left / examined.products[0, 0]))
     if not np.isfinite(size):
         return {}
@@ -325,7 +325,7 @@ def coloured_shares(residuals: Residuals, made: Sequence[Array] | None = None) -
         mean = float(np.mean(within))
         if made is not None:
             known = _power(data, j, made)
-            within = within - known if float(np.mean(known)) <= MOST_KNOWN * mean else within
+            within = within - known if float(np.mean(known)) <= MAX_POSITION_NOISE * mean else within
         found.append(1.0 if mean == 0.0 else float(np.mean(within) - np.median(within)) / mean)
     return np.array(found)
 

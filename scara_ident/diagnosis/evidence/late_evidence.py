@@ -28,7 +28,7 @@ def late_evidence(
     training : Observations
         Of the training recordings, with the effects found.
     criteria : SelectionCriteria, optional
-        A delay that makes less than ``least_gain`` of the squared residual is let pass, as it is as an effect.
+        A delay that makes less than ``min_gain`` of the squared residual is let pass, as it is as an effect.
     """
     if after.variation is None:
         return tuple(shown)
@@ -40,7 +40,7 @@ def late_evidence(
         if item.shown and own is not None and abs(late) > period:
             made = float(np.sum((late * own.directions[KINDS.index("delay")]) ** 2))
             rest = float(np.sum((rows.left(after.value) - own.off) ** 2))
-            if made > criteria.least_gain * (made + rest):
+            if made > criteria.min_gain * (made + rest):
                 why = f"it {late_words(own, late)} in all runs alike, and no effect stands for that"
                 item = replace(item, shown=False, by="", why=why)
         found.append(item)

@@ -22,7 +22,7 @@ from scara_ident.estimation.least_squares import value_and_weights
 from scara_ident.estimation.noise_bias import noise_torque
 from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.residuals import Residuals
-from scara_ident.estimation.run_variation import LEAST_RUNS, RunVariation
+from scara_ident.estimation.run_variation import MIN_RUNS, RunVariation
 
 
 @dataclass(frozen=True)
@@ -93,10 +93,10 @@ class Outcome:
         return suspected(self.search, self.after.weights)
 
 
-def _least_offsets(found: Search, training: Observations) -> RunVariation | None:
+def _min_offsets(found: Search, training: Observations) -> RunVariation | None:
     """Return the offsets that runs differ by at least: two do not say, and what one of them alone carries takes them up."""
     runs = len(training.data.recordings)
-    if runs >= LEAST_RUNS or not any(item.effect.by_recording for item in found.chosen):
+    if runs >= MIN_RUNS or not any(item.effect.by_recording for item in found.chosen):
         return None
     return assumed_variation(training, training.joints, value_and_weights(training)[0]).offsets
 
@@ -107,16 +107,16 @@ def outcome_of(task: SearchTask, found: Search) -> Outcome:
     before = found.uncorrected.residuals(found.start.value)
     after, left = found.start, before
     if training is not found.uncorrected:
-        after = wls(training, least=_least_offsets(found, training))
+        after = wls(training, least=_min_offsets(found, training))
         if found.chosen and (after.offsets or found.step.offsets):
             # With the effects in the model offsets of runs are others, or none.
             found = found.beside(after.offsets)
             training = observed_at_every_sample(found.step)
-            after = wls(training, least=_least_offsets(found, training))
+            after = wls(training, least=_min_offsets(found, training))
         left = training.residuals(after.value)
     joints, criteria = task.model.robot.joints, task.criteria
     least = dict.fromkeys(joints, criteria.remainder)
-    least_share = dict.fromkeys(joints, criteria.least_remainder)
+    min_share = dict.fromkeys(joints, criteria.min_remainder)
     if after.variation:
         # What a run differs by from the others is no remainder of the model; of second order something of it is left.
         off = after.variation.deviations(training, after.value)
@@ -124,7 +124,7 @@ def outcome_of(task: SearchTask, found: Search) -> Outcome:
         left = Residuals(training.data, tuple(torque + more for torque, more in pairs))
         differing = after.variation.sizes(task.model.robot)
         least |= dict.fromkeys(differing, criteria.remainder_of_runs)
-        least_share |= dict.fromkeys(differing, criteria.least_remainder_of_runs)
+        min_share |= dict.fromkeys(differing, criteria.min_remainder_of_runs)
     fit_after, dependences = lack_of_fit(left), screen(task.model, left, criteria)
     # What is spread evenly over frequency is no motion's doing even where it repeats: an encoder's steps do, and what a
     # controller makes of them.
@@ -139,8 +139,8 @@ def outcome_of(task: SearchTask, found: Search) -> Outcome:
         # What the positions' noise does to the columns may repeat too; and what is small beside the torque is not called one.
         torque = [item.torque_rms if item.rows else 0.0 for item in training.by_joint]
         made = noise_torque(training, after.value)
-        small = np.maximum(made, np.array(list(least_share.values())) * torque)
-    least_rms, of_positions = (dict(zip(joints, each.tolist(), strict=True)) for each in (small, made))
+        small = np.maximum(made, np.array(list(min_share.values())) * torque)
+    min_rms, of_positions = (dict(zip(joints, each.tolist(), strict=True)) for each in (small, made))
     # A force that nearly all goes with the position is neither a filter's nor an encoder's, though no effect of an arm is so.
     along = {
         item.candidate.joint(found.scene)
@@ -152,18 +152,18 @@ def outcome_of(task: SearchTask, found: Search) -> Outcome:
         for fit in repeating
         if (fit.missing > of_positions[fit.joint] and fit.joint in along)
         or (
-            fit.missing > least_rms[fit.joint]
+            fit.missing > min_rms[fit.joint]
             and (
                 coloured[fit.joint] > criteria.colour_of_remainder
                 or fit.missing > criteria.far_above_noise * max(fit.noise, of_positions[fit.joint])
             )
         )
     ]
-    depending = [item for item in depending if item.rms > least_rms[item.joint]]
+    depending = [item for item in depending if item.rms > min_rms[item.joint]]
     unexplained = _unexplained(repeating, depending, criteria)
     # An effect may stand for that all the same.
     names = frozenset(
-        fit.joint for fit in above if coloured[fit.joint] > criteria.least_colour or fit.p_value < criteria.significant
+        fit.joint for fit in above if coloured[fit.joint] > criteria.min_colour or fit.p_value < criteria.significant
     )
     fit_before = fit_after if left is before else lack_of_fit(before)
     return Outcome(

@@ -26,7 +26,7 @@ from scara_ident.threads import side_by_side
 # Rates that differ by more than this share are not looked at together.
 SAME_RATE = 0.01
 # Between two frequencies of a recording of its own length a line has this share of its power at the nearer one.
-LEAST_SEEN = 0.7
+MIN_LINE_SHARE = 0.7
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,7 @@ def _may_have(
         power = 0.5 * (np.abs(np.fft.rfft(window * shape)) * 2.0 / np.sum(window)) ** 2
         edge = len(power) if band is None else int(np.searchsorted(np.fft.rfftfreq(count, 1.0 / rate), band, "right"))
         largest += count * np.array([np.max(power[:edge], initial=0.0), np.max(power[edge:], initial=0.0)])
-    return bool(np.any(largest > LEAST_SEEN * samples * within * np.array([criteria.least_colour, 1.0])))
+    return bool(np.any(largest > MIN_LINE_SHARE * samples * within * np.array([criteria.min_colour, 1.0])))
 
 
 def _largest(
@@ -139,7 +139,7 @@ def _largest(
     inside = np.full(len(found), True) if band is None else frequencies <= band
     power = np.where(inside, power, np.minimum(power, frequency_spectrum(recorded, rate, frequencies)))
     share = power / within
-    beyond = np.where(inside, share / criteria.least_colour, share)
+    beyond = np.where(inside, share / criteria.min_colour, share)
     place = int(np.argmax(beyond))
     if beyond[place] <= 1.0:
         return None

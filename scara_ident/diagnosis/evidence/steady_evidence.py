@@ -19,7 +19,7 @@ from scara_ident.robot.robot import Robot
 # Parts of each recording that are compared: a change over a minute shows in few of them, one over seconds in many.
 PARTS = (4, 16)
 # A part of fewer blocks says next to nothing.
-LEAST_BLOCKS = 4
+MIN_BLOCKS = 4
 
 
 def steady_evidence(
@@ -53,7 +53,7 @@ def steady_evidence(
                 worst[joint] = max(worst[joint], (share, _said(item, robot, joint)))
     return tuple(
         replace(item, shown=False, by="", why=f"{share:.0%} of its power changes within recordings as if its {what}")
-        if item.shown and share > criteria.least_colour
+        if item.shown and share > criteria.min_colour
         else item
         for item, (share, what) in zip(shown, worst, strict=True)
     )
@@ -62,7 +62,7 @@ def steady_evidence(
 def _parted(owner: NDArray[np.intp], parts: int) -> NDArray[np.intp] | None:
     """Return where the parts of every recording begin, and the number of blocks; None where none is long enough for two."""
     edges = np.append(np.flatnonzero(np.diff(owner, prepend=-1)), len(owner))
-    counts = np.clip(np.diff(edges) // LEAST_BLOCKS, 1, parts)
+    counts = np.clip(np.diff(edges) // MIN_BLOCKS, 1, parts)
     if np.max(counts, initial=1) < 2:
         return None
     bounds = zip(edges[:-1], edges[1:], counts, strict=True)

@@ -18,10 +18,10 @@ from scara_ident.estimation.variation_between import run_variation
 from scara_ident.motion.prepared import PreparedData
 
 # Each leaves a tenth or less of what the last one left.
-MOST_CORRECTIONS = 6
+MAX_CORRECTIONS = 6
 # Of a column that is three quarters noise an estimate sees a quarter of what is there. What a step is scaled up by ends here, or one
 # that the data hardly answer would go anywhere.
-LEAST_SEEN = 0.25
+MIN_RELIABILITY = 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,11 +170,11 @@ def taken_out(step: SelectionStep, candidate: Candidate) -> tuple[CandidateColum
     whole, last, whole_band = np.zeros(len(candidate.effect.columns(step.scene, candidate.member))), np.inf, step
     step = told_beside(step, candidate)
     seen, before, moved = 1.0, whole, whole
-    for _ in range(MOST_CORRECTIONS):
+    for _ in range(MAX_CORRECTIONS):
         value = still_there(step, candidate, whole)
         size = float(np.linalg.norm(value))
         if np.any(moved):
-            seen = max(LEAST_SEEN, float((before - value) @ moved) / float(moved @ moved))
+            seen = max(MIN_RELIABILITY, float((before - value) @ moved) / float(moved @ moved))
         if candidate.effect.settled(value / seen) or size >= last:
             break
         before, moved, last = value, value / seen, size

@@ -21,7 +21,7 @@ from scara_ident.estimation.covariance import Covariance, block_covariance
 from scara_ident.estimation.information import merge
 from scara_ident.estimation.noise_bias import OF_LAG, noisy
 from scara_ident.estimation.run_offsets import beside_offsets
-from scara_ident.estimation.run_variation import LEAST_RUNS
+from scara_ident.estimation.run_variation import MIN_RUNS
 from scara_ident.estimation.variation_between import run_variation
 from scara_ident.estimation.working_range import Told, told_directions
 
@@ -256,7 +256,7 @@ def _covariance(
     matrix = spread.matrix
     if of_runs:
         variation = run_variation(step.observations, state.joints, state.least, taken=rows.taken(inverse, step.weights))
-        if step.offsets is not None and len(step.observations.data.recordings) < LEAST_RUNS:
+        if step.offsets is not None and len(step.observations.data.recordings) < MIN_RUNS:
             variation = step.offsets
         matrix = matrix + variation.covariance(inverse, influence, step.weights)
     if told is not None:

@@ -27,13 +27,13 @@ NOTHING = 0.04
 # A rise of the squared error by more than this share turns a step back; loads that settle may raise it by less.
 RISE = 1e-5
 # A step that lowers the squared error by a smaller share is the last of a coarse fit.
-LEAST_FALL = 0.03
+MIN_DECREASE = 0.03
 # Of what the linear model promises: a step that kept more may be longer next, and one that kept less was too long.
-MOST_KEPT, LEAST_KEPT = 0.75, 0.25
+GROW_RATIO, SHRINK_RATIO = 0.75, 0.25
 # A step that is turned back is tried again with no smaller share of its length.
 SHORTEST = 0.1
 # No step is tried that is a smaller share of one that nothing holds back.
-LEAST_RADIUS = 0.01
+MIN_RADIUS = 0.01
 
 
 def tune(step: SelectionStep, *, coarse: bool = False) -> SelectionStep:
@@ -62,13 +62,13 @@ def tune(step: SelectionStep, *, coarse: bool = False) -> SelectionStep:
         if best is not None:
             radius = _radius(radius, best.length(way), _kept(best, now, way))
         if best is not None and now.error > (1.0 + RISE) * best.error:
-            if radius < LEAST_RADIUS * best.length(best.step()):
+            if radius < MIN_RADIUS * best.length(best.step()):
                 break
         else:
             # Where the way is longer than a step may be, how little one gains says nothing of the whole, of which the model does.
             whole, std = now.step(), now.solve()[1]
-            near = coarse and (not cut or now.gain(whole) < LEAST_FALL)
-            arrived = near and best is not None and best.error - now.error < LEAST_FALL * best.error
+            near = coarse and (not cut or now.gain(whole) < MIN_DECREASE)
+            arrived = near and best is not None and best.error - now.error < MIN_DECREASE * best.error
             best = now
             if _is_short(now, whole, std, settling):
                 if _is_cut(now, whole):
@@ -140,9 +140,9 @@ def _radius(radius: float, length: float, kept: float) -> float:
     if kept < 0.0:
         # Where the parabola through both errors, with the promised slope, has its least.
         return length * max(SHORTEST, 0.5 / (1.0 - kept))
-    if kept < LEAST_KEPT:
+    if kept < SHRINK_RATIO:
         return 0.5 * length
-    return max(radius, 2.0 * length) if kept > MOST_KEPT else radius
+    return max(radius, 2.0 * length) if kept > GROW_RATIO else radius
 
 
 def _settling(step: SelectionStep) -> NDArray[np.intp]:

@@ -17,7 +17,7 @@ STEPLESS = 1e-9
 # A step is as long as it may be to this share, which no fit notices.
 NEAR = 0.1
 # Multipliers between which one is looked for: below the least nothing is held back, above the most nothing moves.
-LEAST_MULTIPLIER, MOST_MULTIPLIER = 1e-10, 1e6
+MIN_MULTIPLIER, MAX_MULTIPLIER = 1e-10, 1e6
 
 
 def least_squares(columns: Array, target: Array) -> tuple[Array, Array, Array]:
@@ -85,7 +85,7 @@ def within_radius(columns: Array, target: Array, rooms: Sequence[tuple[float, fl
     if not length(columns, found) > (1.0 + NEAR) * radius:
         return found
     size, none = np.diag(np.linalg.norm(columns, axis=0)), np.zeros(columns.shape[1])
-    low, high = np.log(LEAST_MULTIPLIER), np.log(MOST_MULTIPLIER)
+    low, high = np.log(MIN_MULTIPLIER), np.log(MAX_MULTIPLIER)
     while high - low > NEAR:
         middle = 0.5 * (low + high)
         rows = np.vstack([columns, np.exp(0.5 * middle) * size])

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from scara_ident.diagnosis.candidates.candidates import Candidate, CandidateColumns, columns_at_hand
-from scara_ident.diagnosis.fitting.correction import MOST_CORRECTIONS, Correction, corrected
+from scara_ident.diagnosis.fitting.correction import MAX_CORRECTIONS, Correction, corrected
 from scara_ident.diagnosis.selection.search import Search
 from scara_ident.effects import Scene
 from scara_ident.estimation import Estimate
@@ -83,7 +83,7 @@ def _fitted_alone(
     differing = None if after.variation is None else after.variation.without(DELAY).on(one, after.value)
     whole, last = 0.0, np.inf
     aims, sizes = np.zeros(len(late)), np.zeros(len(late))
-    for _ in range(MOST_CORRECTIONS):
+    for _ in range(MAX_CORRECTIONS):
         for place, (joint, (column,)) in enumerate(late.items()):
             left = one.joints[joint].left(after.value)
             for item, a, b in zip(others, stop[:-1], stop[1:], strict=True):

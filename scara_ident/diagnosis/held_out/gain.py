@@ -67,11 +67,11 @@ class HeldOutGain:
         surely smaller is not enough: laws are no more than near, and of an effect that is there 99.0 +- 0.3 % may show.
         """
         removed = 2.0 * self.size - 1.0
-        return removed < criteria.least_of_repeatable and 1.0 - self.size > criteria.least_final_size * self.std
+        return removed < criteria.min_of_repeatable and 1.0 - self.size > criteria.min_final_size * self.std
 
     def borne_out(self, criteria: SelectionCriteria = CRITERIA) -> bool:
         """Whether it surely shows there, and makes the error smaller by what it should."""
-        return self.size > max(0.5, criteria.least_size * self.std) and not self.against(criteria)
+        return self.size > max(0.5, criteria.min_size * self.std) and not self.against(criteria)
 
 
 def held_out_gains(

@@ -23,7 +23,7 @@ from scara_ident.diagnosis.testing.moments import examine_moments
 from scara_ident.diagnosis.testing.selection_step import SelectionStep, best_of_each
 from scara_ident.effects import Parameter
 from scara_ident.estimation.noise_bias import noisy
-from scara_ident.estimation.run_variation import LEAST_RUNS
+from scara_ident.estimation.run_variation import MIN_RUNS
 
 
 def unsettled(found: Search, weights: Array) -> list[Decision]:
@@ -51,7 +51,7 @@ def unsettled(found: Search, weights: Array) -> list[Decision]:
         beside = step.without(place)
         (decision,) = beside.judge([candidate])
         why = None if decision.accepted else decision.why
-        least, essential = step.criteria.least_final_size, candidate.effect.essential(step.scene, candidate.member)
+        least, essential = step.criteria.min_final_size, candidate.effect.essential(step.scene, candidate.member)
         why = why or uncertain(own, decision.examination, essential, least)
         if why is None and free[place]:
             why = _moved_by_noise(moved[place], decision.examination, essential, least)
@@ -60,7 +60,7 @@ def unsettled(found: Search, weights: Array) -> list[Decision]:
         small = candidate.effect.negligible(step.scene, candidate.member, own.at_least(least))
         why = why or (small and f"within its uncertainty {small}")
         why = why or noise_objection(beside, decision)
-        why = why or variation_objection(beside, decision, step.criteria.least_gain)
+        why = why or variation_objection(beside, decision, step.criteria.min_gain)
         why = why or remainder_objection(beside, decision)
         why = why or _repeated(beside, decision)
         if why is not None:
@@ -89,7 +89,7 @@ def _moved_by_noise(own: Coefficients, examination: Examination, essential: slic
 
 def _unsized(step: SelectionStep, candidate: Candidate, sizes: Mapping[str, Parameter]) -> str | None:
     """Say so where the size of one of several effects that act together is not told: it may mend what another lacks."""
-    if told_size(candidate.effect, sizes, step.criteria.least_size):
+    if told_size(candidate.effect, sizes, step.criteria.min_size):
         return None
     return "its size is within its uncertainty beside those that it acts with, of which it may mend what they lack"
 
@@ -131,7 +131,7 @@ def outdone(found: Search, weights: Array, refused: Sequence[Decision]) -> list[
     for place, candidate in enumerate(step.chosen if rivals else ()):
         beside = step.without(place)
         own, *others = beside.judge([candidate, *rivals])
-        enough = step.criteria.least_share * own.examination.held_out
+        enough = step.criteria.min_share * own.examination.held_out
         best = max(others, key=lambda item: item.examination.held_out)
         if best.examination.held_out >= enough:
             result.append(own.refused(f"{best.label}, which is not believed, does as well in its place"))
@@ -165,7 +165,7 @@ def beaten_by_its_like(found: Search, weights: Array) -> list[Decision]:
         enough = criteria.near_confounder * own.examination.held_out
         near = [item for item in best_of_each(others).values() if item.examination.held_out > enough]
         near.sort(key=lambda item: -item.examination.held_out)
-        for item in near[: criteria.most_fitted]:
+        for item in near[: criteria.max_fitted]:
             rival, decision = fitted_with(beside, item.candidate)
             less = float(np.sum(own.examination.left) - np.sum(decision.examination.left))
             if less > 0.0 and not same((beside, own), (rival, decision)):
@@ -189,7 +189,7 @@ def beaten_by_impossible(found: Search, weights: Array) -> list[Decision]:
         item
         for item in best_of_each(found.decisions).values()
         if item.examination.p_value * found.tried <= criteria.family_error
-        and item.gain >= criteria.least_gain
+        and item.gain >= criteria.min_gain
         and hopeless(item, found.scene, criteria) is not None
     ]
     result = []
@@ -235,7 +235,7 @@ def left_open(found: Search, weights: Array, demoted: Sequence[Decision] = ()) -
     # What noise or runs would make is asked no more than it is itself: it need not be sure of it to be possible.
     of_one = replace(found.step.criteria, family_error=found.step.criteria.significant)
     step = replace(found.step, weights=weights, criteria=of_one)
-    differing = len(step.observations.data.recordings) >= LEAST_RUNS
+    differing = len(step.observations.data.recordings) >= MIN_RUNS
     labels = {item.label(found.scene) for item in found.chosen}
     gone = [item for item in demoted if item.label not in labels]
     again = step.judge([item.candidate for item in gone])

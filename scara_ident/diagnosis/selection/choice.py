@@ -14,7 +14,7 @@ from scara_ident.diagnosis.checks.same_errors import same
 from scara_ident.diagnosis.checks.setpoints import setpoint_objection
 from scara_ident.diagnosis.checks.variation_check import best_first, variation_objection
 from scara_ident.diagnosis.criteria import SelectionCriteria
-from scara_ident.diagnosis.fitting.correction import LEAST_SEEN, still_there, taken_out, told_beside
+from scara_ident.diagnosis.fitting.correction import MIN_RELIABILITY, still_there, taken_out, told_beside
 from scara_ident.diagnosis.fitting.effect_parameters import parameters_beside, told_size
 from scara_ident.diagnosis.fitting.linearised import freed_model
 from scara_ident.diagnosis.fitting.nonlinear_fit import tune
@@ -52,7 +52,7 @@ def choose(
     beside = [item for item in first if item.candidate.effect.together and step.scene.together]
     best_gain = max((item.gain for item in accepted), default=0.0)
     found = fitted_beside(step, [item for item in first if item not in beside], best_gain, known)
-    found += _least_left(
+    found += _min_left(
         _each_fitted(step, _promising(step, beside), beside, known) + _in_place_of_the_last(step, beside)
     )
     fitted = {item.label for _, item in found}
@@ -81,7 +81,7 @@ def _soundest(
     # Where the best are refused, the next best may still be sound.
     while open_:
         enough = criteria.near_best * open_[0][1].examination.held_out
-        leaders = [pair for pair in open_ if pair[1].examination.held_out >= enough][: criteria.most_refined]
+        leaders = [pair for pair in open_ if pair[1].examination.held_out >= enough][: criteria.max_refined]
         refined = step.refine([item for own, item in leaders if own is step])
         sure = [item.candidate for item in refined if item.accepted]
         refined += step.judge(
@@ -155,7 +155,7 @@ def _sure_once_refined(step: SelectionStep, best: Sequence[Decision], enough: fl
         and item.examination.held_out >= criteria.near_best * enough
     ]
     worth.sort(key=lambda item: -item.examination.held_out)
-    worth = worth[: criteria.most_refined]
+    worth = worth[: criteria.max_refined]
     points = sum(points_of_lines(item.candidate) for item in worth)
     return [item for item in replace(step, tried=step.tried + points).refine(worth) if item.accepted]
 
@@ -180,7 +180,7 @@ def fitted_beside(
         With the step at the estimate that goes with the candidate.
     """
     criteria = step.criteria
-    enough = max(criteria.least_gain, criteria.near_best * best)
+    enough = max(criteria.min_gain, criteria.near_best * best)
     return _each_fitted(step, _worth_fitting(candidates, enough, step.tried, criteria), candidates, known)
 
 
@@ -208,7 +208,7 @@ def _each_fitted(
     return found
 
 
-def _least_left(found: Sequence[tuple[SelectionStep, Decision]]) -> list[tuple[SelectionStep, Decision]]:
+def _min_left(found: Sequence[tuple[SelectionStep, Decision]]) -> list[tuple[SelectionStep, Decision]]:
     """Return of several fits of the same effects the one that leaves the least.
 
     What the last gains beside the others does not say which: beside others in a wrong minimum it may gain all.
@@ -229,7 +229,7 @@ def _left(decision: Decision) -> float:
 def _if_more(step: SelectionStep, decision: Decision) -> Decision:
     """Return a decision on what was fitted with the model of a step, refused where both leave as much as that alone."""
     before, left = float(np.sum(step.model.squares)), _left(decision)
-    if decision.accepted and before - left < step.criteria.least_gain * before / step.scene.robot.n:
+    if decision.accepted and before - left < step.criteria.min_gain * before / step.scene.robot.n:
         return replace(decision, accepted=False, why="takes the place of an effect in the model")
     return decision
 
@@ -288,7 +288,7 @@ def _worth_fitting(
     best = [item for item in best_of_each(points).values() if item.candidate.effect.name in sure]
     large = {item.candidate.effect.name for item in best if item.gain >= enough}
     best.sort(key=lambda item: -item.gain)
-    return [item for item in best if item.candidate.effect.name in large][: criteria.most_fitted]
+    return [item for item in best if item.candidate.effect.name in large][: criteria.max_fitted]
 
 
 def _promising(step: SelectionStep, points: Sequence[Decision]) -> list[Decision]:
@@ -302,7 +302,7 @@ def _promising(step: SelectionStep, points: Sequence[Decision]) -> list[Decision
     judged = step.judge([item.candidate for item in points], model=freed_model(step))
     sure = [item for item in judged if more_than_chance(item, step.tried, step.criteria)]
     best = sorted(best_of_each(sure).values(), key=lambda item: -item.gain)
-    return best[: step.criteria.most_fitted]
+    return best[: step.criteria.max_fitted]
 
 
 def _in_place_of_the_last(step: SelectionStep, points: Sequence[Decision]) -> list[tuple[SelectionStep, Decision]]:
@@ -314,7 +314,7 @@ def _in_place_of_the_last(step: SelectionStep, points: Sequence[Decision]) -> li
     pairs = [(one, replace(last, member=other)) for one, other in last.effect.instead(step.scene, last.member)]
     pairs = [(one, other) for one, other in pairs if other.label(step.scene) in labels]
     found = []
-    for one, other in pairs[: step.criteria.most_fitted]:
+    for one, other in pairs[: step.criteria.max_fitted]:
         begun = replace(step, chosen=(*step.chosen[:-1], replace(last, member=one)))
         own, decision = fitted_with(begun, other, coarse=True)
         found.append((own, _if_more(step, decision)))
@@ -333,7 +333,7 @@ def _left_again(step: SelectionStep, decision: Decision) -> str | None:
     if candidate.effect.of_each_recording:
         first, hidden = still_there(told_beside(step, candidate), candidate, np.zeros_like(first)), 0.0
     else:
-        hidden = min(max(noise_of_column(step, decision), 0.0), 1.0 - LEAST_SEEN)
+        hidden = min(max(noise_of_column(step, decision), 0.0), 1.0 - MIN_RELIABILITY)
     whole = taken_out(step, candidate)[1].value
     # Between what the first says and what it would be without that noise, which is known roughly, all is as good.
     expected = np.clip(whole, *np.sort([first, first / (1.0 - hidden)], axis=0))
@@ -348,6 +348,6 @@ def _insignificant(step: SelectionStep, candidate: Candidate) -> str | None:
     """Say so where the size of an effect is within its uncertainty, that of its nonlinear parameters included."""
     if not candidate.effect.nonlinear:
         return None
-    if told_size(candidate.effect, parameters_beside(step, candidate), step.criteria.least_size):
+    if told_size(candidate.effect, parameters_beside(step, candidate), step.criteria.min_size):
         return None
     return "its size is within its uncertainty once its other parameters are free"

@@ -101,7 +101,7 @@ def _confounders_of(
     # A rival is asked for once, not in every round of a search, and need not be believed itself: how many others were tried
     # says nothing of whether these two can be told apart. One of the whole arm need not remove as much as all joints leave.
     scene, of_one = step.scene, replace(step.criteria, family_error=step.criteria.significant)
-    criteria = replace(of_one, least_gain=of_one.least_gain / scene.robot.n)
+    criteria = replace(of_one, min_gain=of_one.min_gain / scene.robot.n)
     step = replace(step, criteria=criteria, tried=1)
     # What a model fits of what runs differ by says nothing for it.
     step = counted(step, step.judge([found])[0])
@@ -123,7 +123,7 @@ def _confounders_of(
     others = []
     for beside, decision in [*((step, item) for item in near), *fitted]:
         better = decision.examination.held_out >= saved
-        able = better or decision.examination.held_out >= criteria.least_share * saved
+        able = better or decision.examination.held_out >= criteria.min_share * saved
         if decision.accepted and able and (better or same((step, own), (beside, decision))):
             candidate = decision.candidate
             name, joint = candidate.effect.name, candidate.joint(scene)

@@ -19,7 +19,7 @@ from scara_ident.effects import Scene
 # Of what the effect removes, less than this share more or less is rounding: two models of one span leave the same.
 ROUNDING = 1e-9
 # Columns that follow the base model's estimate instead of the last one gain at least this share of what they would.
-LEAST_AT_FIRST = 0.5
+MIN_PRELIMINARY_SHARE = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +112,7 @@ def near_in_place(step: SelectionStep, found: Decision, pool: Sequence[Candidate
     # By the columns at hand first: most come nowhere near, and need no others. But what the effect itself would do on
     # another joint depends on the model as it does here.
     alike = [item for item in pool if item.effect.name == effect.name]
-    others = enough([item for item in pool if item.effect.name != effect.name], first, LEAST_AT_FIRST * least)
+    others = enough([item for item in pool if item.effect.name != effect.name], first, MIN_PRELIMINARY_SHARE * least)
     return list(best_of_each(step.judge(enough([*alike, *others], step.scene, least))).values())
 
 
@@ -125,8 +125,8 @@ def _fitted_rivals(
     by_fit = fitted_beside(beside, [item for item in near if item.candidate.effect.fitted_first], 0.0, None)
     rest = [item for item in near if item.accepted and not item.candidate.effect.fitted_first]
     rest.sort(key=lambda item: -item.examination.held_out)
-    enough = criteria.least_share * own.examination.held_out
-    refined = [item for item in beside.refine(rest[: criteria.most_refined]) if item.examination.held_out >= enough]
+    enough = criteria.min_share * own.examination.held_out
+    refined = [item for item in beside.refine(rest[: criteria.max_refined]) if item.examination.held_out >= enough]
     fitted = [*by_fit, *(fitted_with(beside, item.candidate) for item in refined)]
     return [pair for pair in fitted if pair[1].accepted]
 

@@ -234,7 +234,7 @@ def _searched(
 ) -> Search:
     """Let in one effect after another until none is left that helps."""
     criteria, near = task.criteria, None if known is None else known.step
-    most = criteria.most_effects * (base.first.robot.n + 1)
+    most = criteria.max_effects * (base.first.robot.n + 1)
     # The fit that a step keeps goes with it: who asked for the search holds another.
     state = replace(state, step=replace(state.step))
     while True:

@@ -90,7 +90,7 @@ def _unseen(examination: Examination, criteria: SelectionCriteria) -> str | None
 
 def _faint(examination: Examination, gain: float, criteria: SelectionCriteria) -> str | None:
     """Say so where the model's own small errors may make it; they do not make most of what is left lie along one column."""
-    if examination.outside >= criteria.least_outside or gain >= criteria.dominant:
+    if examination.outside >= criteria.min_outside or gain >= criteria.dominant:
         return None
     return f"only {examination.outside:.1e} of it lies outside the model, whose own small errors may look like it"
 
@@ -119,9 +119,9 @@ def _small(
     small = candidate.effect.negligible(scene, candidate.member, examination.value)
     if small is not None and not candidate.corrects_data:
         return small
-    if gain >= criteria.least_gain:
+    if gain >= criteria.min_gain:
         return None
-    least = f"below the detection limit: removes {max(gain, 0.0):.1%} of the squared residual, {criteria.least_gain:.0%} is asked"
+    least = f"below the detection limit: removes {max(gain, 0.0):.1%} of the squared residual, {criteria.min_gain:.0%} is asked"
     if gain <= 0.0 or not candidate.corrects_data:
         return least
     if small is None:
@@ -160,7 +160,7 @@ def _insignificant(examination: Examination, tried: int, criteria: SelectionCrit
 def _seldom(candidate: Candidate, examination: Examination, gain: float, criteria: SelectionCriteria) -> str | None:
     helps, voting = examination.votes
     # What is taken out of the recordings is the mean of them, whatever they differ by: left in, others would stand for it.
-    if not voting or candidate.corrects_data or helps >= criteria.least_votes * voting:
+    if not voting or candidate.corrects_data or helps >= criteria.min_votes * voting:
         return None
     # Of few trajectories one may be where it hardly shows: all would be asked of three.
     if gain >= criteria.dominant and voting - helps == 1 and helps > 1:

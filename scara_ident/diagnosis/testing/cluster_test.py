@@ -21,7 +21,7 @@ from scara_ident.diagnosis.testing.balance import BENDS, Weighted, power, shares
 from scara_ident.diagnosis.testing.fitted_model import FittedModel, Products
 
 # Share of a direction that the other blocks must hold, or it cannot be tested without this one.
-_LEAST_REDUNDANCY = 1e-6
+_MIN_REDUNDANCY = 1e-6
 # Fewer degrees of freedom than this after those of several coefficients, and one direction alone is asked too.
 FEW = 10.0
 # Blocks are weighted where one holds more than this share of a direction: more than all others together.
@@ -29,7 +29,7 @@ MOST = 0.5
 # Weights of blocks are chosen for a probability such as one candidate of some two hundred must have.
 ASKED = 1e-5
 # With fewer degrees of freedom no size is significant: it would take millions of standard errors.
-LEAST_FREEDOM = 0.1
+MIN_FREEDOM = 0.1
 # Directions of a few columns below this share of the largest are not tested.
 _RANK = 1e-9
 # Squares of columns that are none: the inverse of less leaves the range of numbers.
@@ -91,7 +91,7 @@ def cluster_test(
     scale = _inverse_root(expected)
     unbiased = scale @ np.einsum("gpi,gpj->gij", pairs, pairs) @ scale
     whitened = np.einsum("gij,gj->gi", back, value)
-    known = np.all(strength > _LEAST_REDUNDANCY, axis=(1, 2))
+    known = np.all(strength > _MIN_REDUNDANCY, axis=(1, 2))
     # What one block alone holds has no scatter of its own, and a covariance of rounding alone.
     least = np.where(known, _least(freedom), 0.0)
     together = _hotelling(whitened, unbiased, least, rank)
@@ -142,7 +142,7 @@ def _balanced(
 def _weights(
     model: FittedModel, products: Products, whitening: tuple[Array, NDArray[np.intp]], freedom: Array, chance: float
 ) -> tuple[NDArray[np.intp], Array, Array]:
-    """Return which candidates need less by weighted blocks, their weights, and what all need, see `least_sizes`."""
+    """Return which candidates need less by weighted blocks, their weights, and what all need, see `min_sizes`."""
     into, rank = whitening
     sizes = np.array([needed(k, v, chance) if k else np.inf for k, v in zip(rank, freedom, strict=True)])
     places = np.flatnonzero((freedom < FEW) & (rank > 0))
@@ -160,7 +160,7 @@ def _weights(
         least = _least(_of_weighted(neighbours, found)[1])
         # What the weighted blocks do not tell has no spread, and what rounding leaves of it may be less than nothing.
         square = np.trace(found.spread, axis1=1, axis2=2)
-        told = (found.strength > _LEAST_REDUNDANCY) & (square > 0.0)
+        told = (found.strength > _MIN_REDUNDANCY) & (square > 0.0)
         spread = np.sqrt(np.where(told, square, np.inf) / rank[places])
         size = spread * [needed(k, v, chance) for k, v in zip(rank[places], least, strict=True)]
         better = size < sizes[places]
@@ -181,7 +181,7 @@ def _of_weighted(neighbours: _Neighbours, found: Weighted) -> tuple[Array, Array
     return _if_white(neighbours, turn @ found.alone @ turn, turn @ found.links, found.signs)
 
 
-def least_sizes(model: FittedModel, products: Products, chance: float) -> Array:
+def min_sizes(model: FittedModel, products: Products, chance: float) -> Array:
     """Return the standard errors of least squares at which candidates become significant, shape (g,); no torque takes part.
 
     Where residuals are white of variance one; the test by weighted blocks takes more of its own, and fewer of these.
@@ -191,7 +191,7 @@ def least_sizes(model: FittedModel, products: Products, chance: float) -> Array:
     _, own, links, strength = _without_blocks(into, reach, products.cross, products.columns)
     alone = own + links @ links.transpose(0, 1, 3, 2)
     _, freedom = _if_white(_Neighbours.of(model), alone, links, np.full(links.shape[-1], -1.0))
-    least = np.where(np.all(strength > _LEAST_REDUNDANCY, axis=(1, 2)), _least(freedom), 0.0)
+    least = np.where(np.all(strength > _MIN_REDUNDANCY, axis=(1, 2)), _least(freedom), 0.0)
     return _weights(model, products, (into, rank), least, chance)[2]
 
 
@@ -214,12 +214,12 @@ def needed(count: int, freedom: float, chance: float) -> float:
     """
     from scipy.special import fdtri
 
-    if freedom < LEAST_FREEDOM:
+    if freedom < MIN_FREEDOM:
         return np.inf
     rest = freedom - count + 1.0
     few = count > 1 and rest < FEW
     share = 0.5 * chance if few else chance
-    together = np.sqrt(fdtri(count, rest, 1.0 - share) * freedom * count / rest) if rest > LEAST_FREEDOM else np.inf
+    together = np.sqrt(fdtri(count, rest, 1.0 - share) * freedom * count / rest) if rest > MIN_FREEDOM else np.inf
     alone = np.sqrt(fdtri(1.0, freedom, 1.0 - share / count)) if few and freedom > 0.0 else np.inf
     return float(min(together, alone))
 
@@ -242,10 +242,10 @@ def _without_blocks(into: Array, reach: Array, cross: Array, columns: Array) -> 
     inside = _both_sides(into, columns + reach @ cross.transpose(0, 1, 3, 2))
     if inside.shape[-1] == 1:
         strength = 1.0 - inside[..., 0]
-        release = 1.0 / np.maximum(strength, _LEAST_REDUNDANCY)[..., None]
+        release = 1.0 / np.maximum(strength, _MIN_REDUNDANCY)[..., None]
     else:
         strength, turn = np.linalg.eigh(np.eye(inside.shape[-1]) - inside)
-        release = (turn / np.maximum(strength, _LEAST_REDUNDANCY)[..., None, :]) @ turn.transpose(0, 1, 3, 2)
+        release = (turn / np.maximum(strength, _MIN_REDUNDANCY)[..., None, :]) @ turn.transpose(0, 1, 3, 2)
     own = release @ inside
     links = np.concatenate([(release @ into.transpose(0, 2, 1)[:, None]) @ reach, own], axis=-1)
     return release, own, links, strength

@@ -21,7 +21,7 @@ from scara_ident.estimation.joint_rows import JointRows
 from scara_ident.threads import THREADS, side_by_side
 
 # What a block leaves to the others of a direction is at least this share: less is rounding.
-LEAST_REDUNDANCY = 1e-9
+MIN_REDUNDANCY = 1e-9
 # A block whose products have a smaller norm leaves a tenth of every direction to the others.
 WELL_SHARED = 0.9
 # Up to so many signals for each direction they are solved for in less time than the inverse is made.
@@ -159,7 +159,7 @@ class FittedModel:
             result[some][strong] = np.linalg.solve(left[strong], own[strong])
             held, directions = np.linalg.eigh(left[~strong])
             turned = directions.transpose(0, 2, 1) @ own[~strong]
-            result[some][~strong] = directions @ (turned / np.maximum(held, LEAST_REDUNDANCY)[:, :, None])
+            result[some][~strong] = directions @ (turned / np.maximum(held, MIN_REDUNDANCY)[:, :, None])
 
         side_by_side(solve, [slice(k, None, THREADS) for k in range(THREADS)])
         return result

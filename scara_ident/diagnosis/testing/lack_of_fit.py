@@ -31,7 +31,7 @@ class LackOfFit:
         What does not repeat: pure error within the band, N m or N.
     missing : float
         What repeats and the model lacks, rms within the band; 0 where it is below what noise alone would give.
-    most_missing : float
+    max_missing : float
         What may repeat at the most, with 95 % confidence.
     p_value : float
         That nothing repeats: the larger of an F test with the band's degrees of freedom and of Student's t test that
@@ -43,7 +43,7 @@ class LackOfFit:
     joint: str
     noise: float
     missing: float
-    most_missing: float
+    max_missing: float
     p_value: float
     by_trajectory: tuple[tuple[str, float], ...]
 

@@ -60,7 +60,7 @@ def screen(model: TorqueModel, residuals: Residuals, criteria: SelectionCriteria
     pair_bins = criteria.pair_bins
     for j, joint in enumerate(model.robot.joints):
         residual, signals, fold, block = _samples(model.robot, residuals, j, criteria.parts)
-        if len(residual) < criteria.least_per_bin * pair_bins**2 or not np.any(residual):
+        if len(residual) < criteria.min_per_bin * pair_bins**2 or not np.any(residual):
             continue
         total = float(np.mean(residual**2))
         singles = {name: _bins(values, criteria.single_bins) for name, values in signals.items()}

@@ -31,7 +31,7 @@ ROUNDING = 1e-7
 # Bodies further inside than this share of the nominal ones need no further search.
 ENOUGH = 0.5
 # Contradictions that are listed; more would not help anyone.
-MOST_REASONS = 5
+MAX_REASONS = 5
 # A base parameter whose multiplier contributes less than this to the margin is not needed for a contradiction.
 NO_PART = 1e-6
 # Slack of the solver's constraints and gap, well below ROUNDING; and the residuals up to which its bounds are used
@@ -315,7 +315,7 @@ def _contradictions(u: Unknowns, value: Array, size: Array, bodies: list[int]) -
     negative = [k for k in bodies if columns[k].nonnegative and value[k] < 0.0]
     reasons = [_column_reason(columns[k], value[k]) for k in negative]
     left = [k for k in bodies if k not in negative]
-    while len(reasons) < MOST_REASONS and left:
+    while len(reasons) < MAX_REASONS and left:
         found = furthest_inside(u, value, fixed_columns(u, left, size))
         if found.possible is not False:
             break

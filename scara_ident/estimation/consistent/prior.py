@@ -39,7 +39,7 @@ from scara_ident.model.terms import Offset
 # The data distinguish a direction from nominal at this many standard deviations; then the prior moves it by this share
 # of one.
 SIGNIFICANT = 4.0
-MOST_BIAS = 0.05
+MAX_BIAS = 0.05
 # No arm differs from its nominal one by more than this factor; a larger standard deviation distinguishes nothing.
 FARTHEST = 1e5
 # What is constant is rather this share of the torque.
@@ -53,7 +53,7 @@ PRECISION = 1e-10
 # and each reached to a rough precision only.
 STRIDE = 4.0
 ROUGH = 1e-2
-MOST_STEPS = 100
+MAX_STEPS = 100
 LINE_STEPS = 12
 # Weights of the logarithmic barrier of limits; the last is too small to move anything.
 BARRIER = (1.0, 1e-2, 1e-4, 1e-6, 1e-8)
@@ -83,7 +83,7 @@ def prior_rows(u: Unknowns, rows: Array, target: Array, weight: float) -> Array:
     # Distance from nominal in standard deviations, z / s, with s = 1 / singular.
     apart = np.abs(left.T @ (target - rows @ u.reference))
     significant = (apart > SIGNIFICANT) & (singular * FARTHEST > 1.0) & (singular > ROUNDING * singular[0])
-    reduced = np.minimum(weight, MOST_BIAS * singular[significant] ** 2 / apart[significant])
+    reduced = np.minimum(weight, MAX_BIAS * singular[significant] ** 2 / apart[significant])
     directions = right[significant]
     form = np.sqrt(weight) * np.eye(u.size)
     form += directions.T @ ((np.sqrt(reduced) - np.sqrt(weight))[:, None] * directions)
@@ -171,7 +171,7 @@ def _newton(start: Array, free: Array, cost: _Cost, precision: float) -> Array:
     n = len(start) // 11
     directions = unpack(np.moveaxis(free[: 10 * n].reshape(n, 10, -1), 2, 1))
     x, value = start, cost.value(start)
-    for _ in range(MOST_STEPS):
+    for _ in range(MAX_STEPS):
         gradient, root, local = cost.slopes(x, directions, free)
         triangular = np.asarray(np.linalg.qr(root, mode="r"))
         half = np.linalg.solve(triangular.T, gradient)
@@ -195,7 +195,7 @@ def _newton(start: Array, free: Array, cost: _Cost, precision: float) -> Array:
                 )
         x, value = trial, new
     raise EstimationError(
-        f"the bodies nearest to the nominal ones were not found in {MOST_STEPS} steps; correct the URDF's inertias"
+        f"the bodies nearest to the nominal ones were not found in {MAX_STEPS} steps; correct the URDF's inertias"
     )
 
 

@@ -22,7 +22,7 @@ from scara_ident.estimation.consistent.options import ConsistentOptions
 from scara_ident.estimation.consistent.prior import nearest_to_nominal, prior_rows
 from scara_ident.estimation.consistent.problem import DEPENDENT, MARGIN, Point, Problem, Unknowns
 from scara_ident.estimation.information import (
-    LEAST_NOISE,
+    MIN_NOISE_SHARE,
     UNDETERMINED,
     Information,
     Solution,
@@ -245,7 +245,7 @@ def _unseen(rows: Array) -> Array:
 
 def noise_of(information: Information, solution: Solution) -> float:
     """Return the residual of the rows, but no less than a millionth of the torque."""
-    return max(information.rms(solution.value), LEAST_NOISE * information.torque_rms) or 1.0
+    return max(information.rms(solution.value), MIN_NOISE_SHARE * information.torque_rms) or 1.0
 
 
 def _determined(problem: Problem, value: Array) -> Array | None:

@@ -62,7 +62,7 @@ GAIN = math.sqrt(math.comb(2 * DIFFERENCES, DIFFERENCES))
 # leaves 1e-16, and a motion of 2 Hz at 125 Hz 3e-13.
 NOTHING = 1e-11
 # So many places in motion tell.
-LEAST_MOVING = 100
+MIN_MOVING_SAMPLES = 100
 # The counts of 32 bits end at 4e9; what a broken channel or a wrong type of number gives has up to 300 digits.
 LARGEST_SIZE = 1e12
 
@@ -260,10 +260,10 @@ def computed(samples: Samples) -> Checked:
 
 def is_computed(position: Array) -> bool:
     """Tell whether a position in motion, shape (N,), is smooth to far less than any encoder resolves."""
-    if len(position) <= DIFFERENCES + LEAST_MOVING:
+    if len(position) <= DIFFERENCES + MIN_MOVING_SAMPLES:
         return False
     moving = np.convolve(np.diff(position) != 0.0, np.ones(DIFFERENCES), "valid") > DIFFERENCES - 0.5
-    if np.count_nonzero(moving) < LEAST_MOVING:
+    if np.count_nonzero(moving) < MIN_MOVING_SAMPLES:
         return False
     noise = float(np.median(np.abs(np.diff(position, n=DIFFERENCES)[moving]))) / GAIN
     return noise <= NOTHING * float(np.max(np.abs(position)))

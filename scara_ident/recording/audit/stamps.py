@@ -23,7 +23,7 @@ BETTER = 0.5
 # A misfit counts up to so many times the usual one: where stamps all but coincide it knows no bounds.
 MOST = 100.0
 # Fewer rows of moving joints say nothing.
-LEAST_ROWS = 5
+MIN_ROWS = 5
 # A joint moves where it goes this share of its rms way over five samples.
 MOVING = 0.2
 # A step below this share of the interval lies within the noise of the clock, and differences over it are noise.
@@ -79,7 +79,7 @@ def _evener(samples: Samples, even: Array) -> float:
         # A joint that stands still says nothing.
         way = np.abs(position[4:] - position[:-4])
         moving = used[way[used] > MOVING * np.sqrt(np.mean(way**2))]
-        if len(moving) < LEAST_ROWS:
+        if len(moving) < MIN_ROWS:
             continue
         misfits = [_misfit(time, position, moving) for time in (samples.time, even)]
         usual = min(float(np.median(item)) for item in misfits)

@@ -13,7 +13,7 @@ from scara_ident.arrays import Array
 from scara_ident.recording.files.files import chosen, refuse_no_numbers
 
 # A matrix with more channels than this is a picture or a table of something else, not a log of joints.
-MOST_CHANNELS = 128
+MAX_CHANNELS = 128
 
 
 def names_of(path: Path, content: Iterable[tuple[str, NDArray[Any]]], wanted: str) -> tuple[str, ...]:
@@ -53,7 +53,7 @@ def channels(name: str, shape: tuple[int, ...]) -> list[str]:
     sizes = [size for size in shape if size != 1]
     if len(sizes) == 1 and sizes[0] > 1:
         return [name]
-    if len(sizes) == 2 and 1 < min(sizes) <= MOST_CHANNELS:
+    if len(sizes) == 2 and 1 < min(sizes) <= MAX_CHANNELS:
         return [f"{name}[{k}]" for k in range(min(sizes))]
     return []
 

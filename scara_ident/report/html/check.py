@@ -27,7 +27,7 @@ from scara_ident.use.check import CLOSE, Check, limits_of_joint, sentences
 from scara_ident.use.energy import Energy
 
 # Points of a line, at the most.
-MOST_POINTS = 6000
+MAX_POINTS = 6000
 # Share of a drive's work below which a part of it is rounding.
 ROUNDING = 1e-9
 
@@ -120,10 +120,10 @@ def _panel(found: Check, j: int, kind: str, height: int = 110) -> Panel:
     for each in found.drives:
         motion = each.motion
         if kind == "torque" and motion.torque is not None:
-            layers.append(thin_line(motion.time, motion.torque[j], MOST_POINTS, "grey", "recorded", 0.8))
+            layers.append(thin_line(motion.time, motion.torque[j], MAX_POINTS, "grey", "recorded", 0.8))
         signal = {"position": motion.q, "velocity": motion.v, "acceleration": motion.a}.get(kind)
         own = (each.torque if kind == "torque" else each.power) if signal is None else signal
-        layers.append(thin_line(motion.time, own[j], MOST_POINTS, "blue", kind))
+        layers.append(thin_line(motion.time, own[j], MAX_POINTS, "blue", kind))
     bounds = limits_of_joint(found.limits, j)[kind]
     layers += [Level(bound, "vermillion", "limit") for bound in bounds if np.isfinite(bound)]
     worst = found.limited_by
@@ -178,6 +178,6 @@ def _balances(found: Check) -> list[Layer]:
             time, power = each.motion.time, each.power[j]
             steps = 0.5 * (power[1:] + power[:-1]) * np.diff(time)
             sums = start + np.concatenate([[0.0], np.cumsum(steps)])
-            layers.append(thin_line(time, sums, MOST_POINTS, color, joint, 1.3, dash))
+            layers.append(thin_line(time, sums, MAX_POINTS, color, joint, 1.3, dash))
             start = float(sums[-1])
     return layers

@@ -10,11 +10,11 @@ from scara_ident.report.html.page import Page, parts
 from scara_ident.report.html.section import NamedSection
 from scara_ident.report.plot import Drawing, Figure, Layer, Panel, Plot, Region, single, thin_line
 from scara_ident.use.contact import ContactFindings, sentences
-from scara_ident.use.contact_force import LEAST_JOINTS
+from scara_ident.use.contact_force import MIN_JOINTS
 from scara_ident.use.external_torque import Observed
 
 # Points of a line and recordings drawn, at the most.
-MOST_POINTS, MOST_RECORDINGS = 3000, 12
+MAX_POINTS, MAX_RECORDINGS = 3000, 12
 
 
 def contact_report(path: Path, found: ContactFindings) -> None:
@@ -67,7 +67,7 @@ def _contacts(found: ContactFindings) -> list[Block]:
                 each.point_words,
             ]
         )
-    told = f"{LEAST_JOINTS} joints or more" if robot.n > LEAST_JOINTS else "all joints"
+    told = f"{MIN_JOINTS} joints or more" if robot.n > MIN_JOINTS else "all joints"
     words = (
         "Torque is the mean on the first joint while it is strong, on the side where effort is recorded. The place is the tool where a constant force "
         f"there explains the torque of {told}, else the outermost link that is loaded: the contact is there or farther out."
@@ -80,7 +80,7 @@ def _contacts(found: ContactFindings) -> list[Block]:
 
 def _torque(found: ContactFindings) -> list[Block]:
     """The external torque of every joint over time."""
-    robot, shown = found.observer.known.robot, found.observed[:MOST_RECORDINGS]
+    robot, shown = found.observer.known.robot, found.observed[:MAX_RECORDINGS]
     variants: dict[tuple[int, ...], Drawing] = {
         (k,): Plot("time [s]", [_panel(found, run, j, 110) for j in range(robot.n)]) for k, run in enumerate(shown)
     }
@@ -102,10 +102,9 @@ def _panel(found: ContactFindings, run: Observed, j: int, height: int) -> Panel:
         for each in found.contacts
         if each.recording == run.name
     ]
-    layers.append(thin_line(run.time, run.torque[j], MOST_POINTS, "blue", "external torque", 1.3))
+    layers.append(thin_line(run.time, run.torque[j], MAX_POINTS, "blue", "external torque", 1.3))
     layers += [
-        thin_line(run.time, sign * threshold, MOST_POINTS, "vermillion", "threshold", 1.3, "5 3")
-        for sign in (-1.0, 1.0)
+        thin_line(run.time, sign * threshold, MAX_POINTS, "vermillion", "threshold", 1.3, "5 3") for sign in (-1.0, 1.0)
     ]
     return Panel(f"{robot.joints[j]} [{robot.torque_unit(j)}]", layers, height)
 

@@ -53,7 +53,7 @@ from scara_ident.threads import one_blas_thread
 
 PICTURED = (("validation", "held-out"), ("training", "training"))
 # Share of the remainder that a dependence explains at least, to be shown: below it reads 0.0 %.
-LEAST_EXPLAINED = 5e-4
+MIN_EXPLAINED = 5e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -256,7 +256,7 @@ def _depending(context: DiagnosisContext) -> list[Block]:
             Cell(f"{item.explained:.1%}", "num", max(0.0, min(1.0, item.explained))),
             f"{number(item.rms)} {context.unit(item.joint)}",
         ]
-        for item in [item for item in context.diagnosis.dependences if item.explained > LEAST_EXPLAINED][:6]
+        for item in [item for item in context.diagnosis.dependences if item.explained > MIN_EXPLAINED][:6]
     ]
     if rows:
         words = "What the remainder depends on: share of its square that means over signals explain on trajectories that they were not taken from."

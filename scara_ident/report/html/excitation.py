@@ -32,7 +32,7 @@ from scara_ident.report.plot import Figure, Grid, Layer, Level, Line, Mark, Pane
 from scara_ident.robot.robot import Robot
 
 # Points at which a motion is drawn, at the most.
-MOST_POINTS = 4000
+MAX_POINTS = 4000
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +127,7 @@ def excitation_report(path: Path, content: Mapping[str, Any], robot: Robot, moti
 
 
 def _joint_figure(robot: Robot, motion: Motion, j: int, place: int, bounds: Mapping[str, float]) -> Figure:
-    every = max(1, motion.samples // MOST_POINTS)
+    every = max(1, motion.samples // MAX_POINTS)
     grid = Grid(float(motion.time[0]), every / motion.rate, -(-motion.samples // every))
     length = robot.position_unit(j)
     lower, upper, speed, torque = _joint_limits(robot, j, bounds)
@@ -148,7 +148,7 @@ def _joint_figure(robot: Robot, motion: Motion, j: int, place: int, bounds: Mapp
 
 def _cover_figure(robot: Robot, motion: Motion, j: int, place: int, bounds: Mapping[str, float]) -> Figure:
     length = robot.position_unit(j)
-    every = max(1, motion.samples // MOST_POINTS)
+    every = max(1, motion.samples // MAX_POINTS)
     layers: list[Layer] = [Line(motion.q[j, ::every], motion.v[j, ::every], "blue", path=True)]
     lower, upper, speed, _ = _joint_limits(robot, j, bounds)
     ends = [end for end in (lower, upper) if np.isfinite(end)]

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 TABLE, REPORT = "fleet.parquet", "report.html"
 # Pictures of a report at the most; of further arms the table has the numbers.
-MOST_PLOTS = 4000
+MAX_PLOTS = 4000
 WHOLE_ARM = "the whole arm"
 _MOODS = {"changed": "bad", "unchanged": "good"}
 
@@ -89,7 +89,7 @@ def _over_time(fleet: Fleet) -> list[Block]:
     for item in fleet.ranked:
         dates = fleet.quantities.get(item.arm, ())
         plots += len(dates[0]) if dates else 0
-        if plots > MOST_PLOTS and shown:
+        if plots > MAX_PLOTS and shown:
             break
         if dates:
             shown.append(item)

@@ -97,13 +97,13 @@ def _means(v: Array, partial: Array, low: float, high: float) -> list[Layer]:
 def _coverage(v: Array, most: float) -> list[Layer]:
     """Strips that are darker where there are more samples."""
     counts, edges = np.histogram(v, COVERAGE_BINS, (-most, most))
-    most_counted = int(counts.max())
+    max_counted = int(counts.max())
     return [
         Region(
             (float(a), float(b)),
             "orange",
             "velocities in the data",
-            round(0.08 + 0.85 * float(count / most_counted) ** 0.5, 3),
+            round(0.08 + 0.85 * float(count / max_counted) ** 0.5, 3),
             0.06,
         )
         for count, a, b in zip(counts, edges[:-1], edges[1:], strict=True)

@@ -30,7 +30,7 @@ from scara_ident.report.traces import FittedContext, Trace, traces
 from scara_ident.threads import one_blas_thread
 
 # Joints whose errors the first sentence lists; of more it gives the range.
-MOST_SHARES = 3
+MAX_JOINTS = 3
 SYMBOLS = (
     "In the meanings m is a mass, mx, my, mz (or m s) are first moments, I is an inertia about the joint's frame, Jm that of "
     "a rotor, l a length and tau 1 / reduction, numbered by link or joint."
@@ -176,7 +176,7 @@ def _headline(identification: Identification) -> str:
     what = "Predicts held-out recordings" if held_out else "Fits its own recordings"
     if not shares:
         return f"{identification.model.name} model of {robot.name}."
-    if len(shares) > MOST_SHARES:
+    if len(shares) > MAX_JOINTS:
         (least, best), (most, worst) = min(shares), max(shares)
         return f"{what} to within {least:.1%} ({best}) to {most:.1%} ({worst}) of the torque, rms."
     return f"{what} to within {' and '.join(f'{share:.1%} of the torque of {joint}' for share, joint in shares)}, rms."

@@ -12,7 +12,7 @@ from scara_ident.robot.robot import Robot
 
 # Pictures of the arm per second, and at the most.
 FRAME_RATE = 25.0
-MOST_FRAMES = 750
+MAX_FRAMES = 750
 # What is smaller against the motion is rounding.
 ROUNDING = 1e-9
 
@@ -25,7 +25,7 @@ def moving_arm(robot: Robot, motion: Motion, name: str) -> Arm:
     name : str
         Unique on the page.
     """
-    count = int(min(MOST_FRAMES, max(2, motion.time[-1] - motion.time[0]) * FRAME_RATE))
+    count = int(min(MAX_FRAMES, max(2, motion.time[-1] - motion.time[0]) * FRAME_RATE))
     places = np.linspace(0, motion.samples - 1, count).astype(int)
     points = joint_points(robot, motion.q[:, places])
     moved = np.ptp(points, axis=0).max(axis=0)

@@ -19,7 +19,7 @@ from scara_ident.report.html.blocks import Arm, Beside, Block, Folded, Gains, Gr
 from scara_ident.report.html.section import Kind, Section, added_sections
 
 # Sentences below the verdict that are all shown, at the most; of more only the first are.
-MOST_SAID, FIRST_SAID = 6, 4
+MAX_SENTENCES, FIRST_SAID = 6, 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +57,9 @@ class Page:
         """What stands below the verdict's first sentence: what comes first of the others, and what asks something."""
         others = self.verdict[1:]
         return [
-            said for k, said in enumerate(others) if len(others) <= MOST_SAID or k < FIRST_SAID or said.endswith("?")
+            said
+            for k, said in enumerate(others)
+            if len(others) <= MAX_SENTENCES or k < FIRST_SAID or said.endswith("?")
         ]
 
     @property

@@ -18,16 +18,16 @@ from scara_ident.report.plot import Band, Drawing, Figure, Layer, Level, Line, M
 from scara_ident.threads import one_blas_thread
 
 # Steps of a recursion that is made for the picture only.
-MOST_STEPS = 48
+MAX_STEPS = 48
 # Recordings whose limits are marked in the pictures of the recursion.
-MOST_MARKS = 12
+MAX_MARKS = 12
 # Figures of the recursion shown together; more are shown in pages of so many.
-MOST_FIGURES = 18
+MAX_FIGURES = 18
 # Share of a body's largest moment below which one of its products is rounding.
 NO_INERTIA = 1e-9
 PER_PAGE = 12
 # Pairs of parameters that are told in words, at the most, and the least size of their correlation.
-MOST_PAIRS, STRONG = 4, 0.9
+MAX_PAIRS, STRONG = 4, 0.9
 
 
 def parameter_table(estimate: Estimate) -> Table:
@@ -109,7 +109,7 @@ def strongest_pairs(estimate: Estimate) -> list[str]:
     size = np.where(known, std, np.inf)
     with np.errstate(invalid="ignore"):
         correlation = np.triu(np.nan_to_num(estimate.covariance / np.outer(size, size), posinf=0.0, neginf=0.0), 1)
-    order = np.argsort(-np.abs(correlation), axis=None)[:MOST_PAIRS]
+    order = np.argsort(-np.abs(correlation), axis=None)[:MAX_PAIRS]
     names = estimate.model.names
     pairs = [np.unravel_index(place, correlation.shape) for place in order]
     return [
@@ -119,7 +119,7 @@ def strongest_pairs(estimate: Estimate) -> list[str]:
 
 def cheap_history(observations: Observations) -> History:
     """Return the course of a recursive estimate in few steps."""
-    size = max(1, -(-observations.blocks // MOST_STEPS))
+    size = max(1, -(-observations.blocks // MAX_STEPS))
     joints = tuple(joint.grouped(size) for joint in observations.joints)
     with one_blas_thread():
         return rls(replace(observations, joints=joints, owner=observations.owner[::size]))[1]
@@ -129,7 +129,7 @@ def convergence_group(estimate: Estimate, history: History, observations: Observ
     """Return for every parameter how the recursive estimate settled."""
     counts = np.mean([joint.counts for joint in observations.joints], axis=0)
     ends = np.cumsum(np.bincount(observations.owner, counts))
-    marks: list[Layer] = [Mark(float(end), "grey") for end in ends[:-1]] if len(ends) <= MOST_MARKS else []
+    marks: list[Layer] = [Mark(float(end), "grey") for end in ends[:-1]] if len(ends) <= MAX_MARKS else []
     plots: dict[str, Plot] = {}
     for k, column in enumerate(estimate.model.columns):
         value, std = history.value[:, k], history.std[:, k]
@@ -157,7 +157,7 @@ def convergence_group(estimate: Estimate, history: History, observations: Observ
 
 def _pages(plots: Mapping[str, Plot], names: Sequence[str]) -> Group:
     """Return all figures, or pages of them to choose from where they are many."""
-    if len(plots) <= MOST_FIGURES:
+    if len(plots) <= MAX_FIGURES:
         figures = [
             single(f"converge-{k}", name, "", plots[name], quiet=True) for k, name in enumerate(names) if name in plots
         ]

@@ -46,7 +46,7 @@ LAW = "the effect as found"
 # How far after a reversal an effect is shown, in the distances over which it acts.
 SHOWN_DISTANCES = 8.0
 # Samples after reversals that the figure holds at least, where the distance is short.
-LEAST_NEAR = 1000
+MIN_SAMPLES = 1000
 
 
 def chapter_group(robot: Robot, chapter: Chapter) -> Group:
@@ -134,7 +134,7 @@ def _means_plot(
     if view.signal == "reversal":
         # Most of the way to the next reversal has nothing to tell.
         far = SHOWN_DISTANCES * chapter.distance if chapter.distance else 0.0
-        enough = float(np.quantile(after, min(1.0, LEAST_NEAR / max(1, len(after)))))
+        enough = float(np.quantile(after, min(1.0, MIN_SAMPLES / max(1, len(after)))))
         limits = (0.0, min(limits[1], max(far, enough)) or limits[1])
     layers: list[Layer] = []
     for traces, signals, color, name in (

@@ -17,9 +17,9 @@ from scara_ident.robot.robot import Robot
 # Samples per period of the band that are drawn of signals within it: straight lines between them then show its shape.
 DRAWN_PER_PERIOD = 16.0
 # Samples of recorded torque on the whole page; longer recordings are drawn as envelopes of as many samples as needed.
-MOST_SAMPLES = 1_500_000
+MAX_SAMPLES = 1_500_000
 # Times left out that are shorter than this share of a recording are not marked.
-LEAST_SEEN = 400
+MIN_MARKED = 400
 WORDS = (
     "Recorded: the effort in the file times its gain, as it is. Measured: the same within the band that the estimate used, as "
     "is predicted torque. Below, measured less predicted, faded out towards rest as in the estimate."
@@ -42,7 +42,7 @@ def torque_group(robot: Robot, parts: Sequence[tuple[str, Sequence[Trace]]], ban
         for trace in found
         for band in bands
     )
-    bucket = int(np.ceil(2.0 * total / MOST_SAMPLES)) if total > MOST_SAMPLES else 1
+    bucket = int(np.ceil(2.0 * total / MAX_SAMPLES)) if total > MAX_SAMPLES else 1
     variants: dict[tuple[int, ...], Drawing] = {
         (r, j): torque_plot(robot, found, j, bands[j], bucket)
         for r, (_, found) in enumerate(parts)
@@ -90,7 +90,7 @@ def torque_plot(robot: Robot, traces: Sequence[Trace], j: int, band: float | Non
 
 def unused_regions(trace: Trace, j: int) -> list[Layer]:
     """Return strips over the times that the estimate of a joint leaves out, but for moments that could not be seen."""
-    seen = max(1, trace.motion.samples // LEAST_SEEN)
+    seen = max(1, trace.motion.samples // MIN_MARKED)
     return [
         Region((float(trace.time[start]), float(trace.time[stop - 1])), "grey", "not used: ends, standstill", 0.25)
         for start, stop in runs_of(~trace.used[j])

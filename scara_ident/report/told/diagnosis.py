@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 # Candidates shown where not all are wanted.
-MOST_CANDIDATES = 8
+MAX_CANDIDATES = 8
 # The content of ``diagnosis.json``.
 content = diagnosis_dict
 
@@ -84,7 +84,7 @@ def tables(held: dict[str, Any], *, all_candidates: bool = False) -> list[Table]
     errors.caption, errors.caption_justify = left_out_words(held) or None, "left"
     rows = table("candidates", "candidate", "gain", "p", "why", right=("gain", "p"))
     tried = held["candidates"]
-    shown = tried if all_candidates else beyond_chance(tried)[:MOST_CANDIDATES]
+    shown = tried if all_candidates else beyond_chance(tried)[:MAX_CANDIDATES]
     for row in shown:
         rows.add_row(row["label"], f"{row['gain']:.1%}", f"{row['p_value']:.0e}", row["why"])
     others = len(tried) - len(shown)

@@ -127,7 +127,7 @@ def test_what_does_much_less_or_something_else_is_not_compared():
         [Candidate(Spring(), Member(0)), Candidate(Spring(), Member(1)), Candidate(TimeDelay(), Member(1))]
     )
     best, other = sorted([first, second], key=lambda item: -item.examination.held_out)
-    assert other.examination.held_out > step.criteria.least_share * best.examination.held_out
+    assert other.examination.held_out > step.criteria.min_share * best.examination.held_out
     order = [item.label for _, item in best_first([(step, item) for item in (small, other, best)])]
     assert order == [best.label, other.label, small.label]
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from scara_ident.diagnosis.criteria import CRITERIA
-from scara_ident.diagnosis.evidence.even_evidence import LEAST_ALIKE, _Left, even_evidence
+from scara_ident.diagnosis.evidence.even_evidence import MIN_RUNS, _Left, even_evidence
 from scara_ident.diagnosis.evidence.evidence import Evidence
 from scara_ident.estimation import wls
 from scara_ident.estimation.observations import Observations
@@ -88,7 +88,7 @@ def test_runs_that_differ_leave_more_and_less():
     assert [item.shown for item in unknown] == [False, False]
     assert even_evidence(SHOWN, after, training) == SHOWN
     # So few might be one that carries something.
-    few = training.of(range(LEAST_ALIKE - 1))
+    few = training.of(range(MIN_RUNS - 1))
     assert not all(item.shown for item in even_evidence(SHOWN, wls(few), few))
 
 

@@ -16,7 +16,7 @@ from scara_ident.diagnosis.evidence.evidence import (
     coloured_shares,
     evidence,
     held_out_evidence,
-    least_found,
+    min_found,
     unsure_of_others,
 )
 from scara_ident.diagnosis.testing.lack_of_fit import LackOfFit
@@ -93,14 +93,14 @@ def nothing_missing():
 def test_complete_is_earned_by_repetition(nothing_missing):
     assert nothing_missing.verdict == "complete"
     assert [item.by for item in nothing_missing.evidence] == ["repetition"] * 2
-    assert all(item.limit < CRITERIA.least_power for item in nothing_missing.evidence)
+    assert all(item.limit < CRITERIA.min_power for item in nothing_missing.evidence)
 
 
 @pytest.mark.slow
 def test_an_effect_comes_in_from_its_detection_limit_on(nothing_missing):
     search = nothing_missing.search
     decision = best_of_each(search.decisions)["spring of joint2"]
-    ((name, limit),) = least_found(search, decision).items()
+    ((name, limit),) = min_found(search, decision).items()
     assert (name, limit.unit) == ("stiffness", "N m/rad")
     accepted = []
     for share in (0.0, 0.6, 1.4):
@@ -109,8 +109,8 @@ def test_an_effect_comes_in_from_its_detection_limit_on(nothing_missing):
         accepted.append(step.judge([decision.candidate])[0].accepted)
     assert accepted == [False, False, True]
     # Of several coefficients no one size is the least.
-    assert least_found(search, best_of_each(search.decisions)["friction_coupling of joint2 by joint1"]) == {}
-    assert all(item.limit >= CRITERIA.least_gain for item in nothing_missing.evidence)
+    assert min_found(search, best_of_each(search.decisions)["friction_coupling of joint2 by joint1"]) == {}
+    assert all(item.limit >= CRITERIA.min_gain for item in nothing_missing.evidence)
 
 
 @pytest.mark.slow

@@ -28,7 +28,7 @@ def test_where_runs_differ_a_remainder_is_more() -> None:
     assert outcome.after.variation
     assert set(outcome.after.variation.sizes(MODEL.robot)) == {"joint2"}
     first, second = (item.torque_rms for item in outcome.training.by_joint)
-    assert outcome.small == pytest.approx([CRITERIA.least_remainder * first, CRITERIA.least_remainder_of_runs * second])
+    assert outcome.small == pytest.approx([CRITERIA.min_remainder * first, CRITERIA.min_remainder_of_runs * second])
 
 
 def test_the_rms_of_a_joint_is_that_of_its_rows() -> None:
@@ -46,7 +46,7 @@ def test_what_repeats_is_a_remainder_where_most_of_it_is_not_spread_evenly(size:
     runs = runs_that_repeat(0.04, lambda run: size * np.sin(2.6 * np.pi * run.time))
     outcome = selected(runs, Spring(), bands=(11.0, 11.0), free=False)
     share = coloured_shares(outcome.residuals)[0]
-    assert share > CRITERIA.least_colour
+    assert share > CRITERIA.min_colour
     assert (share > CRITERIA.colour_of_remainder) == standing_out
     assert (outcome.unexplained is not None) == standing_out
 
@@ -56,7 +56,7 @@ def test_what_repeats_far_above_noise_is_a_remainder_of_any_colour(size: float, 
     """Cogging of 5 N beside 0.2 N of noise was `undecided`: over many speeds it is as even as white noise."""
     runs = runs_that_repeat(size)
     outcome = selected(runs, Spring(), bands=(11.0, 11.0), free=False)
-    assert coloured_shares(outcome.residuals)[0] < CRITERIA.least_colour
+    assert coloured_shares(outcome.residuals)[0] < CRITERIA.min_colour
     (fit,) = [fit for fit in outcome.fit_after if fit.joint == "joint1"]
     assert (fit.missing > CRITERIA.far_above_noise * fit.noise) is unexplained
     assert (outcome.unexplained is not None) is unexplained
@@ -69,7 +69,7 @@ def test_what_goes_as_an_effect_of_no_arm_is_a_remainder_however_small_beside_th
     """A chain on a lift, 98 N/m that push away, was `undecided`: it was small beside the weight, as what filters leave."""
     runs = with_torque(exact_runs(2, 3), 0, lambda motion: -size * motion.q[0])
     # As if it were as small beside the torque as may be left over.
-    names = ("remainder", "remainder_of_runs", "least_remainder", "least_remainder_of_runs")
+    names = ("remainder", "remainder_of_runs", "min_remainder", "min_remainder_of_runs")
     lenient = replace(CRITERIA, **dict.fromkeys(names, 1.0))
     found = outcome_of(SearchTask(MODEL, (Spring(),), lenient), searched(runs, Spring(), bands=(11.0, 11.0)))
     assert any(item.as_no_arm > CRITERIA.nearly_all for item in found.search.decisions) is along

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from scara_ident.diagnosis.evidence.evidence import Evidence
-from scara_ident.diagnosis.evidence.steady_evidence import LEAST_BLOCKS, _parted, steady_evidence
+from scara_ident.diagnosis.evidence.steady_evidence import MIN_BLOCKS, _parted, steady_evidence
 from scara_ident.estimation import wls
 from scara_ident.recording.recording import Recording
 from tests.diagnosis.made import exact_runs, observed, with_torque
@@ -74,7 +74,7 @@ def test_nothing_is_asked_where_nothing_was_shown_or_parts_are_too_short():
     training = observed(changing(0.05, 9.0))
     doubted = tuple(replace(item, shown=False) for item in SHOWN)
     assert steady_evidence(doubted, wls(training), training) == doubted
-    few = replace(training, owner=np.arange(len(training.owner)) // (2 * LEAST_BLOCKS - 1))
+    few = replace(training, owner=np.arange(len(training.owner)) // (2 * MIN_BLOCKS - 1))
     assert steady_evidence(SHOWN, wls(training), few) == SHOWN
 
 

@@ -265,7 +265,7 @@ def test_what_is_sure_enough_is_said_and_nothing_else(size: float, std: float, b
 
 def test_how_little_stands_for_another_is_as_of_what_repeats():
     gain = HeldOutGain(0.1, 0.66, 0.1, "joint1", 0.1, 0.09)
-    assert not gain.against(replace(CRITERIA, least_of_repeatable=0.3))
+    assert not gain.against(replace(CRITERIA, min_of_repeatable=0.3))
 
 
 def test_percentages_have_two_digits_and_no_powers_of_ten():

@@ -86,7 +86,7 @@ def test_a_spring_of_the_arm_stands(monkeypatch: pytest.MonkeyPatch):
     (held,) = (item.decision for item in found.steps)
     assert outdone(found, found.step.weights, ()) == []
     (other,) = found.step.without(0).judge([Candidate(AsymmetricFriction(), Member(1))])
-    assert other.examination.held_out < CRITERIA.least_share * held.examination.held_out
+    assert other.examination.held_out < CRITERIA.min_share * held.examination.held_out
     assert outdone(found, found.step.weights, (other,)) == []
     proxy = replace(found, step=replace(found.step, chosen=(other.candidate,)))
     (fallen,) = outdone(proxy, found.step.weights, (other.refused(""), held.refused("")))
@@ -320,11 +320,11 @@ class Roughness(Effect):
 
 
 # More votes than there are refuse whatever it is.
-@pytest.mark.parametrize(("votes", "verdict"), [(2.0, "undecided"), (CRITERIA.least_votes, "explained")])
+@pytest.mark.parametrize(("votes", "verdict"), [(2.0, "undecided"), (CRITERIA.min_votes, "explained")])
 def test_what_looks_like_noise_and_is_not_believed_is_not_shown_to_be_noise(votes: float, verdict: str):
     """A delay of all joints that removed 38 % at p = 6.5e-8 was refused for another reason, and the rest called `complete`."""
     made = with_torque(exact_runs(3, 1), 0, lambda motion: 0.012 * np.sin(400.0 * motion.q[0]))
-    criteria = replace(CRITERIA, least_votes=votes)
+    criteria = replace(CRITERIA, min_votes=votes)
     result = diagnose(load_robot(), made, bands=(30.0, 30.0), catalogue=(Roughness(),), criteria=criteria)
 
     assert result.verdict == verdict

@@ -16,8 +16,8 @@ from scara_ident.diagnosis.fitting.nonlinear_fit import tune
 from scara_ident.diagnosis.selection.choice import (
     _by_other_laws,
     _each_fitted,
-    _least_left,
     _left_again,
+    _min_left,
     _plainer_first,
     _sure_once_refined,
     _worth_fitting,
@@ -81,13 +81,13 @@ def test_what_an_effect_may_stand_for_on_another_joint_is_fitted_beside_it():
 def test_a_resonance_that_one_grid_point_shows_large_and_another_sure_is_fitted():
     """At 20,000 N m/rad, with little damping, the point that removed most was unsure, and a sure one removed too little."""
     large, sure, other = point("a1", 0.091, 0.033), point("a1", 0.027, 1.4e-4), point("a2", 0.005, 0.13)
-    assert _worth_fitting([sure, other, large], CRITERIA.least_gain, 116, CRITERIA) == [large, other]
+    assert _worth_fitting([sure, other, large], CRITERIA.min_gain, 116, CRITERIA) == [large, other]
     # Sure of the other joint alone, for which it may stand.
     sure = point("a2", 0.027, 1.4e-4)
-    assert _worth_fitting([large, sure], CRITERIA.least_gain, 116, CRITERIA) == [large, sure]
+    assert _worth_fitting([large, sure], CRITERIA.min_gain, 116, CRITERIA) == [large, sure]
     # A point that makes things worse is sure of nothing, and none may be large enough.
-    assert _worth_fitting([large, point("a1", -0.1, 1e-9)], CRITERIA.least_gain, 116, CRITERIA) == []
-    assert _worth_fitting([sure, other], CRITERIA.least_gain, 116, CRITERIA) == []
+    assert _worth_fitting([large, point("a1", -0.1, 1e-9)], CRITERIA.min_gain, 116, CRITERIA) == []
+    assert _worth_fitting([sure, other], CRITERIA.min_gain, 116, CRITERIA) == []
 
 
 def test_what_takes_the_place_of_an_effect_in_the_model_does_not_come_in(monkeypatch):
@@ -150,7 +150,7 @@ def test_of_the_same_effects_the_fit_that_leaves_least_is_taken_whatever_the_las
         return SimpleNamespace(scene=None, chosen=[SimpleNamespace(label=lambda _: beside)]), decision
 
     wrong, right, other = fit("a2", "a1", 90.0, 0.9), fit("a1", "a2", 20.0, 0.3), fit("a3", "a1", 50.0, 0.8)
-    assert _least_left([wrong, other, right]) == [right, other]
+    assert _min_left([wrong, other, right]) == [right, other]
 
 
 @pytest.mark.parametrize(("last", "plain"), [(4.0, True), (6.3, False)])

@@ -183,7 +183,7 @@ def test_a_rival_of_the_whole_arm_is_named_where_it_removes_little_of_what_all_j
     step = searched(with_torque(exact_runs(), 0, lambda motion: 0.0023 * (motion.q[0] - MIDDLE)), Spring()).step
     (own,) = step.without(0).judge(step.chosen)
     beside = step.without(0).judge([Candidate(OfTheArm(), Member(None))])
-    assert beside[0].gain < CRITERIA.least_gain < own.gain
+    assert beside[0].gain < CRITERIA.min_gain < own.gain
     ((rival,),) = confounders(step, beside, step.scene)
     assert rival.label == "of_the_arm"
 

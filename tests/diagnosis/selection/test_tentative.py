@@ -21,7 +21,7 @@ from tests.diagnosis.made import BANDS, exact_runs, searched, with_torque
 def doubtful():
     """A spring that would have to help in more trajectories than there are."""
     runs = with_torque(exact_runs(), 1, lambda motion: 0.05 * motion.q[1])
-    criteria = replace(CRITERIA, least_votes=1.01)
+    criteria = replace(CRITERIA, min_votes=1.01)
     return diagnose(load_robot(), runs, bands=BANDS, catalogue=(Spring(),), criteria=criteria)
 
 

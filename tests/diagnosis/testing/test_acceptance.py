@@ -162,9 +162,9 @@ def test_too_small_a_gain_is_below_the_detection_limit(gain: float, removes: str
 @pytest.mark.parametrize(
     ("change", "why"),
     [
-        ({"least_outside": 0.6}, "lies outside the model"),
+        ({"min_outside": 0.6}, "lies outside the model"),
         ({"family_error": 1e-11}, "could be chance"),
-        ({"least_gain": 0.5}, "below the detection limit: removes 40.0% of the squared residual, 50% is asked"),
+        ({"min_gain": 0.5}, "below the detection limit: removes 40.0% of the squared residual, 50% is asked"),
     ],
 )
 def test_the_numbers_are_those_of_the_criteria(change: dict, why: str):
@@ -175,7 +175,7 @@ def test_the_numbers_are_those_of_the_criteria(change: dict, why: str):
 
 def test_votes_are_asked_as_the_criteria_say():
     item = replace(GOOD, fold_gains=(0.5, -0.1, 0.2, None))
-    assert decide(SPRING, item, 0.4, SCENE, 100, replace(CRITERIA, least_votes=0.6)).accepted
+    assert decide(SPRING, item, 0.4, SCENE, 100, replace(CRITERIA, min_votes=0.6)).accepted
 
 
 def test_what_fits_with_an_impossible_sign_only_has_no_gain_and_no_significance():

@@ -9,7 +9,7 @@ from scipy import stats
 from scipy.signal import lfilter
 
 from scara_ident.diagnosis.testing.candidate_tests import examine
-from scara_ident.diagnosis.testing.cluster_test import least_sizes, needed, significance
+from scara_ident.diagnosis.testing.cluster_test import min_sizes, needed, significance
 from scara_ident.diagnosis.testing.fitted_model import FittedModel, products_of
 from scara_ident.estimation.joint_rows import JointRows
 
@@ -158,5 +158,5 @@ def test_columns_that_the_model_holds_but_for_rounding_have_no_share_below_zero(
         model = model_of(columns, rng.standard_normal(6 * ROWS), 6)
         tried = rng.standard_normal((2, 4)) @ columns
         tried[:, : 2 * ROWS] += 1e-7 * rng.standard_normal((2, 2 * ROWS))
-        told += [least_sizes(model, products_of(model, [{0: tried}]), 1e-4)[0]]
+        told += [min_sizes(model, products_of(model, [{0: tried}]), 1e-4)[0]]
     assert np.all(np.array(told) > 0.0)

@@ -8,7 +8,7 @@ import pytest
 
 from scara_ident.errors import ScaraIdentError
 from scara_ident.report.html.identification import IdentificationContext, identification_report
-from scara_ident.report.html.page import FIRST_SAID, MOST_SAID, Page, breakable, typeset
+from scara_ident.report.html.page import FIRST_SAID, MAX_SENTENCES, Page, breakable, typeset
 from tests.report.html.document import data_of, document
 from tests.report.simulated import made, run
 
@@ -82,9 +82,9 @@ def test_a_number_stays_with_its_unit_and_percent_looks_the_same_everywhere():
 
 
 def test_of_a_long_verdict_the_first_sentences_are_shown_and_what_asks_something():
-    said = ["Verdict.", *(f"Sentence {k}." for k in range(MOST_SAID)), "Is the gain right?"]
+    said = ["Verdict.", *(f"Sentence {k}." for k in range(MAX_SENTENCES)), "Is the gain right?"]
     page = Page("", "", said, ())
     assert page.shown == [*said[1 : 1 + FIRST_SAID], "Is the gain right?"]
     assert sorted([*page.shown, *page.folded]) == sorted(said[1:])
-    short = Page("", "", said[: MOST_SAID + 1], ())
-    assert (list(short.shown), list(short.folded)) == (said[1 : MOST_SAID + 1], [])
+    short = Page("", "", said[: MAX_SENTENCES + 1], ())
+    assert (list(short.shown), list(short.folded)) == (said[1 : MAX_SENTENCES + 1], [])
