@@ -248,7 +248,7 @@ def import_program() -> None:
     ours = (
         *("cli.main", "excitation.known", "export.robots", "identification.identify", "inspection.inspection"),
         *("recording.files.hdf5", "recording.files.mat", "recording.files.rosbag", "report.base", "report.html"),
-        *("report.pictures", "report.told.identification", "simulation.named", "simulation.simulate"),
+        *("report.pictures", "report.summaries.identification", "simulation.named", "simulation.simulate"),
     )
     others = ("cvxpy", "h5py", "matplotlib.figure", "polars", "rosbags.highlevel", "scipy.io", "scipy.stats")
     stores = ("dashing", "eloquent", "foxy", "galactic", "humble")

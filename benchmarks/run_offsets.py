@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident import build_model, load_robot, observe, prepare, read_recordings
-from scara_ident.estimation.least_squares import told_value_and_weights
+from scara_ident.estimation.least_squares import determined_value_and_weights
 from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.run_variation import KINDS, OFFSET, RunVariation
 from scara_ident.estimation.variation_between import run_variation
@@ -53,10 +53,10 @@ def ratios_of(arm: Path, model: str) -> dict[str, Array]:
     for label in dict.fromkeys(whole.data.labels):
         left_out = [k for k, name in enumerate(whole.data.labels) if name == label]
         training = whole.of([k for k in range(len(recordings)) if k not in left_out])
-        plain, _ = told_value_and_weights(training)
+        plain, _ = determined_value_and_weights(training)
         variation = run_variation(training, training.joints, plain)
         for case, kinds in CASES.items():
-            value, _ = told_value_and_weights(training, alone(variation, kinds))
+            value, _ = determined_value_and_weights(training, alone(variation, kinds))
             found[case] += [np.log(errors(whole.of([k]), value) / errors(whole.of([k]), plain)) for k in left_out]
     return {case: np.array(rows) for case, rows in found.items()}
 

@@ -20,7 +20,7 @@ from scara_ident.excitation.design import Design, design_excitation
 from scara_ident.excitation.known import read_diagnosis, read_parameters
 from scara_ident.excitation.limits import Limits
 from scara_ident.excitation.output import excitation_dict, write_joint_trajectory, write_trajectory
-from scara_ident.excitation.promise import SURE, Told
+from scara_ident.excitation.promise import SURE, ExpectedAnswer
 from scara_ident.excitation.search import Effort, Progress
 from scara_ident.files import write_json, written_together
 from scara_ident.inquiry.answerability import Inquiry, inquiry_of
@@ -32,7 +32,7 @@ from scara_ident.recording.files.parquet_csv import SUFFIXES
 from scara_ident.report.html.diagnosis import DiagnosisContext, diagnosis_report
 from scara_ident.robot.robot import Robot
 
-State = Literal["record", "settled", "untold"]
+State = Literal["record", "settled", "unanswered"]
 # A motion is worth recording if it brings the answers so many times further apart than they are.
 WORTH = 1.5
 # How often recordings are asked for to answer one question, and to lower what they hardly show.
@@ -50,7 +50,7 @@ class Asked:
     ----------
     inputs : str
         Hash of the recordings and of how they are diagnosed.
-    state : {"record", "settled", "untold"} or None
+    state : {"record", "settled", "unanswered"} or None
         Whether a motion waits to be recorded, nothing is open, or no motion within the limits would tell; None where
         ``diagnosis.json`` is of these recordings and that is still to be found.
     words : str
@@ -180,7 +180,7 @@ def beside_recordings(folder: Path) -> list[Path]:
     return sorted(path for path in folder.glob("*") if path.suffix.lower() in SUFFIXES and path.is_file())
 
 
-def told_so_far(folder: Path) -> str:
+def progress_in_words(folder: Path) -> str:
     """Return in a line what the diagnosis of the recordings that lie in a folder came to.
 
     Raises
@@ -225,7 +225,7 @@ def _first(folder: Path, settings: Settings, asked: Asked, work: Work) -> Asked:
     """Ask for a motion that tells much of everything, where nothing was recorded."""
     model = build_model(settings.robot, settings.model)
     design = design_excitation(
-        model, duration=settings.duration, limits=settings.limits, effort=settings.effort, progress=_told(work)
+        model, duration=settings.duration, limits=settings.limits, effort=settings.effort, progress=_on_progress(work)
     )
     words = "Nothing is recorded yet: record next/trajectory.csv, twice, into recordings/."
     _written(folder, design)
@@ -253,7 +253,7 @@ def _designed(folder: Path, settings: Settings, recordings: Sequence[Path], aske
         _removed(folder)
         tired = [item.text for item in inquiry.questions if asked.times.get(key_of(item), 0) >= MAX_REQUESTS]
         words = f"Asked {MAX_REQUESTS} times and still open: {'; '.join(tired)}." if tired else "Nothing is open."
-        return _note(folder, replace(asked, state="untold" if tired else "settled", words=words))
+        return _note(folder, replace(asked, state="unanswered" if tired else "settled", words=words))
     inquiry = inquiry_of({**content, "next": [item.entry() for item in left]}, settings.robot, read)
     design = design_excitation(
         inquiry.scene.model,
@@ -262,25 +262,25 @@ def _designed(folder: Path, settings: Settings, recordings: Sequence[Path], aske
         known=read_parameters(folder / "diagnosis.json", inquiry.scene.model),
         limits=settings.limits,
         effort=settings.effort,
-        progress=_told(work),
+        progress=_on_progress(work),
     )
-    told = worth_recording(design.tells)
-    if not told:
+    worthwhile = worth_recording(design.tells)
+    if not worthwhile:
         _removed(folder)
         others = "; ".join(f"{item.question.text}: {item.remedy}" for item in design.tells)
         words = f"No motion within the limits would tell. What would: {others}."
-        return _note(folder, replace(asked, state="untold", words=words))
+        return _note(folder, replace(asked, state="unanswered", words=words))
     _written(folder, design)
     write_json(folder / "diagnosis.json", _promised(content, design.tells))
     words = (
-        f"Record next/trajectory.csv into recordings/. It asks: {told[0].question.text}; "
-        f"{told[0].before:.2g} standard errors apart so far, {told[0].after:.2g} expected with it."
+        f"Record next/trajectory.csv into recordings/. It asks: {worthwhile[0].question.text}; "
+        f"{worthwhile[0].before:.2g} standard errors apart so far, {worthwhile[0].after:.2g} expected with it."
     )
-    keys = tuple(dict.fromkeys(key_of(item.question) for item in told))
+    keys = tuple(dict.fromkeys(key_of(item.question) for item in worthwhile))
     return _note(folder, replace(asked, state="record", words=words, asked=keys))
 
 
-def _told(work: Work) -> Callable[[Progress], None]:
+def _on_progress(work: Work) -> Callable[[Progress], None]:
     """Tell of every search of a design."""
     work("designing: search 1")
     return lambda state: work(f"designing: search {state.done} of {state.total} done", state.done / state.total)
@@ -314,7 +314,7 @@ def still_open(inquiry: Inquiry, verdict: str, times: Mapping[str, int]) -> list
     return found
 
 
-def worth_recording(tells: Sequence[Told]) -> list[Told]:
+def worth_recording(tells: Sequence[ExpectedAnswer]) -> list[ExpectedAnswer]:
     """Return what a motion tells for sure and much surer than is known, and some of which would be believed."""
     return [
         item
@@ -323,7 +323,7 @@ def worth_recording(tells: Sequence[Told]) -> list[Told]:
     ]
 
 
-def _promised(content: Mapping[str, Any], tells: Sequence[Told]) -> dict[str, Any]:
+def _promised(content: Mapping[str, Any], tells: Sequence[ExpectedAnswer]) -> dict[str, Any]:
     """Return a diagnosis with how far apart the designed motion is expected to bring the answers to what it asks."""
     after = {item.question.text: item.after for item in tells}
     steps = [

@@ -73,15 +73,15 @@ class Reported(Frozen):
     """A result that tells of itself: in words, as a table, as a figure, and in a notebook."""
 
     # The module of the room `report` that tells of it. That room knows the results, so it is loaded when it is asked.
-    _told_by: ClassVar[str]
+    _reported_by: ClassVar[str]
 
-    def __init_subclass__(cls, told_by: str | None = None) -> None:
-        if told_by is not None:
-            cls._told_by = told_by
+    def __init_subclass__(cls, reported_by: str | None = None) -> None:
+        if reported_by is not None:
+            cls._reported_by = reported_by
 
     @property
     def _reports(self) -> Reports:
-        return cast(Reports, import_module(f"scara_ident.report.told.{self._told_by}"))
+        return cast(Reports, import_module(f"scara_ident.report.summaries.{self._reported_by}"))
 
     def summary(self) -> str:
         """Return the result in words and tables, as the command prints it."""

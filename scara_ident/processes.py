@@ -183,9 +183,9 @@ def halved(work: Callable[[Item], Result], items: Sequence[Item], sizes: Sequenc
         least.add(place)
     if not other or works_alone() or available_cores() == 1 or not _OWN.get() or not _may_fork():
         return [work(item) for item in items]
-    with one_thread(), beside(lambda: [work(items[place]) for place in sorted(other)]) as told:
+    with one_thread(), beside(lambda: [work(items[place]) for place in sorted(other)]) as results:
         found = {place: work(items[place]) for place in sorted(own)}
-        found |= zip(sorted(other), told(), strict=True)
+        found |= zip(sorted(other), results(), strict=True)
     return [found[place] for place in range(len(items))]
 
 

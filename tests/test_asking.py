@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 
 from scara_ident import asking
-from scara_ident.asking import Asked, Settings, ask, key_of, read_asked, still_open, told_so_far, worth_recording
+from scara_ident.asking import Asked, Settings, ask, key_of, progress_in_words, read_asked, still_open, worth_recording
 from scara_ident.errors import ScaraIdentError
 from scara_ident.excitation import Effort, limits_of
-from scara_ident.excitation.promise import Shown, Told
+from scara_ident.excitation.promise import ExpectedAnswer, Shown
 from scara_ident.inquiry.answerability import inquire
 from scara_ident.inquiry.questions import Question, questions
 from scara_ident.recording.recording import write_recording
@@ -62,7 +62,7 @@ def test_what_the_diagnosis_came_to_is_told_in_a_line(tmp_path: Path):
         ),
     ):
         (tmp_path / "diagnosis.json").write_text(json.dumps({**content, "effects": effects}))
-        assert told_so_far(tmp_path) == f"So far: undecided, {said}; all of it in {tmp_path / 'report.html'}."
+        assert progress_in_words(tmp_path) == f"So far: undecided, {said}; all of it in {tmp_path / 'report.html'}."
 
 
 @pytest.mark.slow
@@ -121,12 +121,12 @@ def test_a_question_that_recordings_did_not_answer_is_not_asked_for_ever():
 
 def test_only_a_motion_that_makes_surer_is_recorded():
     one = Question("parameter", "a", parameter="a", size=1.0)
-    told = [Told(one, 1.0, 8.0), Told(one, 1.0, 4.0), Told(one, 7.0, 8.0)]
+    told = [ExpectedAnswer(one, 1.0, 8.0), ExpectedAnswer(one, 1.0, 4.0), ExpectedAnswer(one, 7.0, 8.0)]
     assert worth_recording(told) == told[:1]
     first, *_ = questions(open_diagnosis())
     hidden = replace(first, kind="below_limit")
     faint = tuple(Shown(item, 0.5, {}) for item in hidden.suspects)
-    told = [Told(hidden, 1.0, 8.0, faint), Told(hidden, 1.0, 8.0, faint[:1])]
+    told = [ExpectedAnswer(hidden, 1.0, 8.0, faint), ExpectedAnswer(hidden, 1.0, 8.0, faint[:1])]
     assert worth_recording(told) == told[1:]
 
 
@@ -135,11 +135,11 @@ def test_where_no_motion_tells_it_says_the_experiment_of_what_stays_hidden(
 ):
     first = questions(open_diagnosis())[0]
     general = replace(first, kind="below_limit", text="what these hardly show", experiment="record another motion")
-    faint = Told(general, 1.0, 8.0, tuple(Shown(item, 0.5, {}) for item in general.suspects))
+    faint = ExpectedAnswer(general, 1.0, 8.0, tuple(Shown(item, 0.5, {}) for item in general.suspects))
     design = type("Design", (), {"tells": (faint,)})()
     monkeypatch.setattr(asking, "design_excitation", lambda *_, **__: design)
     found = ask(folder, QUICK)
-    assert found.state == "untold"
+    assert found.state == "unanswered"
     assert found.words == (
         f"No motion within the limits would tell. What would: what these hardly show: {faint.remedy}."
     )

@@ -37,7 +37,7 @@ def ask(
     steps: Annotated[int, typer.Option(min=1, help="Motions that the virtual arm records at most.")] = 4,
 ) -> None:
     """Say what to record next: diagnose the recordings so far, and design the motion that settles what they leave open."""
-    from scara_ident.asking import Settings, beside_recordings, recordings_in, told_so_far
+    from scara_ident.asking import Settings, beside_recordings, progress_in_words, recordings_in
     from scara_ident.asking import ask as run
     from scara_ident.errors import UsageError
     from scara_ident.excitation import Effort
@@ -63,7 +63,7 @@ def ask(
             found = run(folder, settings, work)
         console.note(found.left_out)
         if recordings_in(folder) and (folder / "diagnosis.json").is_file():
-            console.print(told_so_far(folder))
+            console.print(progress_in_words(folder))
         console.print(found.words)
         if found.state == "record" and within.clearance is not None:
             console.note(within.clearance.notes)

@@ -27,7 +27,7 @@ def compare(
             from scara_ident.files import write_json
             from scara_ident.identification.compare import compare as run
             from scara_ident.report.comparison import comparison_dict
-            from scara_ident.report.told.comparison import tables
+            from scara_ident.report.summaries.comparison import tables
 
             ((given, useless),) = wanted()
         result = run(arm, given, model=model, method=method, progress=work.part(READING_SHARE, 1.0))

@@ -15,7 +15,7 @@ import typer
 from rich.console import Console
 
 from scara_ident.errors import PluginWarning
-from scara_ident.report.told.words import table as table
+from scara_ident.report.summaries.words import table as table
 
 if TYPE_CHECKING:
     from scara_ident.progress import Work
@@ -147,7 +147,7 @@ def _drain(stream: TextIO) -> None:
 
 def show_recordings(console: Console, recordings: Sequence[Recording]) -> None:
     """Print what every recording holds and what its audit found."""
-    from scara_ident.report.told.recording import recordings_table
+    from scara_ident.report.summaries.recording import recordings_table
 
     console.print(recordings_table(recordings))
     for item in recordings:

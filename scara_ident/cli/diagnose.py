@@ -73,7 +73,7 @@ def diagnose(
                 from scara_ident.report.html.diagnosis import diagnosis_report
                 from scara_ident.report.html.page import page_template
                 from scara_ident.report.pictures import remove_stale
-                from scara_ident.report.told.diagnosis import tables
+                from scara_ident.report.summaries.diagnosis import tables
 
                 if output is not None:
                     _ = page_template()
@@ -90,7 +90,7 @@ def diagnose(
             )
             if output is not None:
                 work("what the effects cost", 1.0)
-                context, drawn = others.enter_context(_told_beside(result))
+                context, drawn = others.enter_context(_drawn_meanwhile(result))
                 _ = context.content
         content = diagnosis_dict(result) if output is None else context.content
         console = result_console(content, json)
@@ -118,7 +118,7 @@ def diagnose(
 
 
 @contextmanager
-def _told_beside(result: Diagnosis) -> Iterator[tuple[DiagnosisContext, Callable[[], tuple[Picture, ...]]]]:
+def _drawn_meanwhile(result: Diagnosis) -> Iterator[tuple[DiagnosisContext, Callable[[], tuple[Picture, ...]]]]:
     """Find out what the effects cost, and draw the pictures, in processes of their own meanwhile.
 
     Yields what is made once for all that is printed and written, and what waits for the pictures.
@@ -136,7 +136,7 @@ def _told_beside(result: Diagnosis) -> Iterator[tuple[DiagnosisContext, Callable
     with ExitStack() as others:
         if result.effects:
             # The compiled arm takes a hundred megabytes, and what draws takes some, which go with their processes.
-            told = others.enter_context(beside(lambda: worth_dict(identified_model(result))))
-            context = DiagnosisContext(result, told)
+            worth = others.enter_context(beside(lambda: worth_dict(identified_model(result))))
+            context = DiagnosisContext(result, worth)
         context.make_ready()
         yield context, others.enter_context(beside(lambda: diagnosis_pictures(context)))

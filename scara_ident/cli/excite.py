@@ -110,7 +110,7 @@ def excite(
     from scara_ident.model.model import build_model
     from scara_ident.report.html.excitation import excitation_report
     from scara_ident.report.pictures import design_picture
-    from scara_ident.report.told.design import limit_table
+    from scara_ident.report.summaries.design import limit_table
     from scara_ident.robot.robot import load_robot
 
     check_report(output, "excitation")
@@ -155,7 +155,7 @@ def excite(
         prior = known_information(equation, recorded, counted, weights) if recorded else None
         inquiry = None if asked is None else inquiry_of(asked, arm, recorded)
 
-        def told(state: Progress) -> None:
+        def on_progress(state: Progress) -> None:
             words = f"search {state.done} of {state.total} done, best so far {-state.cost:.2f}"
             work(words, SEARCHES_SHARE * state.done / state.total)
 
@@ -174,7 +174,7 @@ def excite(
             start=None if place is None else np.array(place),
             family=family,
             effort=Effort(starts=starts, seed=seed),
-            progress=told,
+            progress=on_progress,
         )
     content = excitation_dict(design, stopping(design, aim, unjudged) if asked_std else None)
     console = result_console(content, json)

@@ -46,7 +46,7 @@ def identify(
             from scara_ident.identification.identify import identify as run
             from scara_ident.report.doubts import parted
             from scara_ident.report.identification import identification_dict
-            from scara_ident.report.told.identification import bands_said, tables
+            from scara_ident.report.summaries.identification import bands_said, tables
 
             (training, useless), (held_out, more) = wanted()
         result = run(

@@ -150,7 +150,7 @@ def _meaning(column: Any) -> str:
     if column.quantity is None:
         return ""
     # A name that begins with the joint's need not say it again.
-    told = column.joint is None or column.name.startswith(f"{column.joint}.")
-    text = column.quantity if told else f"{column.quantity} of {column.joint}"
+    named = column.joint is None or column.name.startswith(f"{column.joint}.")
+    text = column.quantity if named else f"{column.quantity} of {column.joint}"
     text += f", {column.unit}" if column.unit else ""
     return text if column.channel else f"({text})"

@@ -23,7 +23,7 @@ from scara_ident.diagnosis.found_effect import (
     uncounted_correction,
 )
 from scara_ident.diagnosis.held_out.validation import Validation, validated
-from scara_ident.diagnosis.model_selection import select_model, told_where_quiet
+from scara_ident.diagnosis.model_selection import below_position_noise, select_model
 from scara_ident.diagnosis.selection.confounding import confounders
 from scara_ident.diagnosis.selection.interval_events import not_explained
 from scara_ident.diagnosis.selection.search import Search, SearchTask
@@ -62,7 +62,7 @@ QUIETER = "all is told below {:.2g} Hz: up to {:.2g} Hz, where it was found, the
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Diagnosis(Saved, told_by="diagnosis"):
+class Diagnosis(Saved, reported_by="diagnosis"):
     """What `diagnose` found.
 
     Attributes
@@ -248,18 +248,18 @@ def diagnose(
     chosen = catalogue is not None and not set(CATALOGUE) <= set(catalogue)
     task = SearchTask(base, families, criteria, searching(work, band_given=given), chosen)
     outcome, events = _without_events(task, observations, free=not given)
-    told = outcome if given else told_where_quiet(task, outcome)
+    reported = outcome if given else below_position_noise(task, outcome)
     work("comparing what was found with what else it could be", task.progress.stop)
-    found = told.search
-    step, whole = replace(found.step, weights=told.after.weights), _whole(told)
+    found = reported.search
+    step, whole = replace(found.step, weights=reported.after.weights), _whole(reported)
     parameters = parameters_of_laws(whole) if whole.chosen else PhysicalParameters()
     groups = confounders(step, found.decisions, found.first, found.doubtful) if found.chosen else []
-    final = told if parameters.linear is None else with_whole_estimate(told, parameters.linear)
+    final = reported if parameters.linear is None else with_whole_estimate(reported, parameters.linear)
     rows, useless = with_rows(held_out.at(found.bands), found.scene.robot, needed=False)
     held = validated(final, rows)
     # What was asked beside the model stays as it was asked, and where.
     final = replace(final, search=found)
-    searched, seen = (final, held) if told is outcome else _where_searched(outcome, held_out)
+    searched, seen = (final, held) if reported is outcome else _where_searched(outcome, held_out)
     readings = direct_readings(found, families, criteria.rotor_inertia_std)
     effects = found_effects(found, groups, parameters, readings, held.gains)
     refused = (*outcome.demoted, *outcome.suspected)
@@ -267,7 +267,7 @@ def diagnose(
     notes += [note for note in (*useless, *held.notes) if note not in notes]
     notes += not_found(readings, effects)
     notes += [f"{item.label} is not counted: {item.why}" for item in refused]
-    if told is not outcome:
+    if reported is not outcome:
         notes.append(QUIETER.format(found.scene.band, searched.search.scene.band))
     notes += _remarks(final, parameters)
     notes += [event.sentence(robot) for event in events]

@@ -9,7 +9,7 @@ import numpy as np
 
 from scara_ident.diagnosis.candidates.candidates import Candidate
 from scara_ident.diagnosis.checks.setpoints import OR_ELSE, may_be_setpoints
-from scara_ident.diagnosis.fitting.effect_parameters import Coefficients, PhysicalParameters, told_size
+from scara_ident.diagnosis.fitting.effect_parameters import Coefficients, PhysicalParameters, size_is_determined
 from scara_ident.diagnosis.held_out.gain import HeldOutGain
 from scara_ident.diagnosis.selection.confounding import Confounder
 from scara_ident.diagnosis.selection.search import Search
@@ -39,7 +39,7 @@ class FoundEffect:
         Those of its parameters that a channel of its own, as of a second encoder, tells without this fit.
     held_out : HeldOutGain or None
         What it changes on recordings that no choice has seen; None where there are none in which it acts.
-    size_told : bool
+    size_determined : bool
         Whether its size differs from none with all that is unsure about it, such as the law that it follows. That it is
         there is told by what it removes, whatever that law.
     """
@@ -57,7 +57,7 @@ class FoundEffect:
     candidate: Candidate | None = None
     direct: Mapping[str, Parameter] = field(default_factory=dict)
     held_out: HeldOutGain | None = None
-    size_told: bool = True
+    size_determined: bool = True
 
     @property
     def label(self) -> str:
@@ -84,12 +84,12 @@ Readings = Mapping[tuple[str, str | None], Mapping[str, Parameter]]
 
 def direct_readings(found: Search, families: Sequence[Effect], rotor_std: float) -> Readings:
     """Return what channels tell of effects without a fit, by effect and joint, where they tell something."""
-    told = {
+    found_parameters = {
         (family.name, joint): family.read_directly(found.scene, j, found.data.recordings, rotor_std)
         for family in families
         for j, joint in enumerate(found.scene.robot.joints)
     }
-    return {key: values for key, values in told.items() if values}
+    return {key: values for key, values in found_parameters.items() if values}
 
 
 def not_found(readings: Readings, effects: Sequence[FoundEffect]) -> list[str]:
@@ -157,7 +157,7 @@ def found_effects(
                 candidate.effect.name,
                 candidate.joint(scene),
                 candidate.effect.description(scene, candidate.member) + otherwise,
-                candidate.effect.told(values),
+                candidate.effect.with_even_powers(values),
                 confounded,
                 min(1.0, decision.examination.p_value * found.tried),
                 decision.gain,
@@ -167,7 +167,7 @@ def found_effects(
                 None if candidate.corrects_data else candidate,
                 readings.get((candidate.effect.name, candidate.joint(scene)), {}),
                 held_out.get(candidate.label(scene)),
-                told_size(candidate.effect, values, found.step.criteria.min_size),
+                size_is_determined(candidate.effect, values, found.step.criteria.min_size),
             )
         )
         before = now
@@ -195,9 +195,9 @@ def uncounted_correction(found: Search, parameters: PhysicalParameters) -> str |
     small = candidate.effect.negligible(found.scene, candidate.member, least)
     if np.any(least) and small is None:
         return None
-    told = said(candidate.effect.parameters(found.scene, candidate.member, value, whole))
+    found_parameters = said(candidate.effect.parameters(found.scene, candidate.member, value, whole))
     if found.correction.of_each:
-        told = f"{candidate.effect.description(found.scene, candidate.member)}: {told}"
+        found_parameters = f"{candidate.effect.description(found.scene, candidate.member)}: {found_parameters}"
     if not np.any(least):
-        return f"{told}, with what runs differ by counted: within {stds:g} standard deviations of none"
-    return f"{told}, with what runs differ by counted: less {stds:g} standard deviations, {small}"
+        return f"{found_parameters}, with what runs differ by counted: within {stds:g} standard deviations of none"
+    return f"{found_parameters}, with what runs differ by counted: less {stds:g} standard deviations, {small}"

@@ -21,8 +21,8 @@ from scara_ident.diagnosis.selection.audit import (
     unsettled,
 )
 from scara_ident.diagnosis.selection.choice import fitted_beside, more_than_chance
+from scara_ident.diagnosis.selection.other_bands import in_bands_of
 from scara_ident.diagnosis.selection.search import Search, SearchTask, in_place_of, scene_of, search, search_again
-from scara_ident.diagnosis.selection.told_in import told_in
 from scara_ident.diagnosis.testing.acceptance import Decision, hopeless
 from scara_ident.diagnosis.testing.selection_step import SelectionStep
 from scara_ident.diagnosis.work import first, next_of
@@ -59,20 +59,20 @@ def select_model(task: SearchTask, observations: Observations, *, free: bool) ->
         promised = max(asked, _promised_band(found, criteria))
         if not looked and max(explains, promised) < criteria.wider * _widest(found.data):
             looked, promised = True, _band_beyond(task, found)
-        wider = min(max(explains, promised), _told(found))
+        wider = min(max(explains, promised), _corrected_band(found))
         if wider < criteria.wider * _widest(found.data):
             break
         more = CandidateColumns(observe(task.model, data.at((wider,) * len(data.bands))))
         found.step.lean()
         now, left = next_of(left)
         again = search(replace(task, progress=now), more, known=found)
-        told = asked >= criteria.wider * _widest(found.data) and _asked_band(again) > 0.0
-        if promised > explains and not told and not _new(again, found):
+        confirmed = asked >= criteria.wider * _widest(found.data) and _asked_band(again) > 0.0
+        if promised > explains and not confirmed and not _new(again, found):
             # The motion says less of what is so far up, and there is nothing.
             break
         found.step.columns.leave()
         # For what was found there, not for what the motion tells or effects in the model ask for.
-        narrower = found if promised > explains and not told else None
+        narrower = found if promised > explains and not confirmed else None
         found = again
     left("testing what is left")
     outcome = _without_proxies(replace(task, progress=left), outcome_of(task, found))
@@ -83,7 +83,7 @@ def select_model(task: SearchTask, observations: Observations, *, free: bool) ->
     return replace(back, demoted=(*outcome.demoted, *back.demoted))
 
 
-def told_where_quiet(task: SearchTask, outcome: Outcome) -> Outcome:
+def below_position_noise(task: SearchTask, outcome: Outcome) -> Outcome:
     """Return what a search leaves, told from the lower part of the band where the noise of positions moves what was found.
 
     Effects that act together tell so, see `quieter`, and all that was fitted with them moves too. As it was where something is left
@@ -96,7 +96,7 @@ def told_where_quiet(task: SearchTask, outcome: Outcome) -> Outcome:
     if below is None:
         return outcome
     task.progress("fitting below the noise of the positions", 1.0)
-    moved = outcome_of(task, told_in(found, below))
+    moved = outcome_of(task, in_bands_of(found, below))
     if moved.unexplained is not None or _unstable(moved, outcome.demoted):
         return outcome
     return replace(moved, demoted=outcome.demoted, suspected=outcome.suspected)
@@ -159,10 +159,10 @@ def _asked_band(found: Search) -> float:
 
 
 def _within(band: float, found: Search) -> float:
-    return min(band, HIGHEST_BAND * min(part.rate for part in found.data.stretches), _told(found))
+    return min(band, HIGHEST_BAND * min(part.rate for part in found.data.stretches), _corrected_band(found))
 
 
-def _told(found: Search) -> float:
+def _corrected_band(found: Search) -> float:
     """Return the band, Hz, beyond which the rest of a correction hides what the arm does; infinite without one."""
     left = None if found.correction is None else found.correction.left(found.scene)
     return np.inf if left is None else left[1]

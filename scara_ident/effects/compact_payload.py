@@ -76,7 +76,7 @@ class CompactPayload(PayloadOfRecordings):
         body = point_mass(np.array(member.nonlinear))[list(shown)]
         return [np.einsum("jkn,k->jn", body_columns(signals, shown), body)]
 
-    def _told(self, robot: Robot) -> tuple[int, ...]:
+    def _determined(self, robot: Robot) -> tuple[int, ...]:
         """Return the mass: all else follows from it and the point."""
         return (0,)
 

@@ -241,7 +241,7 @@ class Effect(ABC):
     def parameters(self, scene: Scene, member: Member, value: Array, covariance: Array) -> Mapping[str, Parameter]:
         """Turn coefficients (k,) and their covariance (k, k) into the effect's physical parameters.
 
-        The nonlinear parameters are added by the caller, who knows how sure they are. Where `told_beside` names a member
+        The nonlinear parameters are added by the caller, who knows how sure they are. Where `estimated_beside` names a member
         that was found too, its coefficients follow.
         """
         return {
@@ -249,11 +249,11 @@ class Effect(ABC):
             for k, column in enumerate(self.columns(scene, member))
         }
 
-    def told(self, parameters: Mapping[str, Parameter]) -> Mapping[str, Parameter]:
+    def with_even_powers(self, parameters: Mapping[str, Parameter]) -> Mapping[str, Parameter]:
         """Return physical parameters, nonlinear ones too, with the power of each that the data tell, where others decide that."""
         return parameters
 
-    def told_beside(self, scene: Scene, member: Member) -> Member | None:
+    def estimated_beside(self, scene: Scene, member: Member) -> Member | None:
         """Return the member of this family by whose coefficients too, where it is found, the physical parameters are."""
         return None
 
@@ -391,7 +391,7 @@ class Effect(ABC):
         """Return what the torque (n, N) of effects in the model adds to the columns, shape (n, k, N); None where that is nothing."""
         return None
 
-    def told_apart_from(self, scene: Scene, member: Member) -> tuple[tuple[Effect, Member], ...]:
+    def distinguished_from(self, scene: Scene, member: Member) -> tuple[tuple[Effect, Member], ...]:
         """Return what is no part of an arm and may look like it in the lower part of the band, beside which it is told there."""
         return ()
 

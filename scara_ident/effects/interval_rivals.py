@@ -59,9 +59,9 @@ def beaten(scene: Scene, shown: Sequence[int], cells: Cells, asked: Asked, scatt
     alone = squares(body) - cost * k
     for other in (rubbing, scale, offset, offsets, force, forces):
         instead = squares(other)
-        told = int(np.count_nonzero(np.einsum("qa,ab,qb->q", other, spread, other) > 0.0))
+        determined = int(np.count_nonzero(np.einsum("qa,ab,qb->q", other, spread, other) > 0.0))
         pressed = other is force or other is forces
-        if instead - cost * told > alone + max(STRONG, ALIKE * alone if pressed else 0.0):
+        if instead - cost * determined > alone + max(STRONG, ALIKE * alone if pressed else 0.0):
             return True
         if not pressed and squares(body, other) - instead < cost * k:
             return True

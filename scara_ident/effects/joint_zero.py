@@ -57,8 +57,8 @@ class JointZero(Effect):
 
     def joints(self, scene: Scene) -> list[int]:
         """Return the joints whose zero the base model's parameters do not take up."""
-        told = _told(scene.model)
-        return [j for j in super().joints(scene) if j in told]
+        identifiable = _identifiable(scene.model)
+        return [j for j in super().joints(scene) if j in identifiable]
 
     def scan(self, scene: Scene, joint: int) -> Iterable[tuple[float, ...]]:
         """Return no offset, where the column is the derivative; the fit goes on from there."""
@@ -157,7 +157,7 @@ def zero_columns(model: TorqueModel, motion: Motion, rng: np.random.Generator) -
 
 
 @lru_cache(maxsize=8)
-def _told(model: TorqueModel) -> frozenset[int]:
+def _identifiable(model: TorqueModel) -> frozenset[int]:
     """Return the joints whose zero the parameters of a model do not take up, whatever the arm does."""
     rng = np.random.default_rng(0)
     motion = random_motion(model.robot, rng, 40 + len(model.columns))

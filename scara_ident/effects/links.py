@@ -378,5 +378,5 @@ def guessed_armatures(scene: Scene) -> dict[int, float]:
     return {
         joint: min(scene.nominal_armature(joint), 0.5 * largest_armature(scene, joint))
         for joint in range(scene.robot.n)
-        if not scene.robot.rotor_stated[joint] and scene.told_armature(joint) is None
+        if not scene.robot.rotor_stated[joint] and scene.known_armature(joint) is None
     }

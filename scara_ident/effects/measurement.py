@@ -157,7 +157,7 @@ class TorqueGainMismatch(Effect):
         places, rows = predicted_slopes(signals, member.place)
         return {member.place: (places, value[0] * rows)}
 
-    def told_beside(self, scene: Scene, member: Member) -> Member | None:
+    def estimated_beside(self, scene: Scene, member: Member) -> Member | None:
         """Return that of the first joint, to whose scale the ratio is."""
         first = _compared(scene, member)[0]
         return None if member.joint == first else Member(first)
@@ -263,7 +263,7 @@ class TimeDelay(Effect):
             "held to the next"
         )
 
-    def told_apart_from(self, scene: Scene, member: Member) -> tuple[tuple[Effect, Member], ...]:
+    def distinguished_from(self, scene: Scene, member: Member) -> tuple[tuple[Effect, Member], ...]:
         """Return when the friction of each of its joints turns."""
         return tuple((LateTurn(), Member(joint)) for joint in self.rows(scene, member))
 

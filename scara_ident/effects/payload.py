@@ -103,13 +103,13 @@ class FreePayloadChange(PayloadChange):
         meaning = "{} of a payload in the frame of the last joint"
         return tuple(
             Column(f"payload_{name}", None, BODY_UNITS[k], meaning.format(name))
-            for k in self._told(scene.robot)
+            for k in self._determined(scene.robot)
             for name in [BODY_PARAMETERS[k]]
         )
 
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
         """Return the torque per standard parameter of the payload from then on."""
-        columns = body_columns(signals, self._told(signals.scene.robot))
+        columns = body_columns(signals, self._determined(signals.scene.robot))
         return np.moveaxis(columns * self.acting(signals, member), 1, 0)
 
     def in_full(self) -> Effect | None:
@@ -118,11 +118,11 @@ class FreePayloadChange(PayloadChange):
 
     def essential(self, scene: Scene, member: Member) -> slice:
         """Return the mass where the torque tells it, if all of the body is tried: see `PayloadOfRecordings.essential`."""
-        return slice(0, 1) if self.whole and self._told(scene.robot)[0] == 0 else slice(None)
+        return slice(0, 1) if self.whole and self._determined(scene.robot)[0] == 0 else slice(None)
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """Say so where mass and inertia differ in sign, or an arm would carry more than it weighs."""
-        shown = self._told(scene.robot)
+        shown = self._determined(scene.robot)
         # Masses and moments of inertia of one body are all positive, or all negative if it was taken away.
         signs = {
             float(np.sign(value[place]))
@@ -136,10 +136,10 @@ class FreePayloadChange(PayloadChange):
     def parameters(self, scene: Scene, member: Member, value: Array, covariance: Array) -> Mapping[str, Parameter]:
         """Return what the columns say, the mass under its own name."""
         found = super().parameters(scene, member, value, covariance).values()
-        names = ("mass" if k == 0 else BODY_PARAMETERS[k] for k in self._told(scene.robot))
+        names = ("mass" if k == 0 else BODY_PARAMETERS[k] for k in self._determined(scene.robot))
         return dict(zip(names, found, strict=True))
 
-    def _told(self, robot: Robot) -> tuple[int, ...]:
+    def _determined(self, robot: Robot) -> tuple[int, ...]:
         """Return the standard parameters that are estimated."""
         return shown_of(robot, BODY_COLUMNS, BODY_COLUMN_SHARE) if self.whole else shown_of(robot)
 
@@ -176,8 +176,8 @@ class PayloadOfRecordings(Effect):
 
     def members(self, scene: Scene) -> tuple[Member, ...]:
         """Return one per group of recordings."""
-        told = [k for k in shown_of(scene.robot, BODY_COLUMNS, BODY_COLUMN_SHARE) if k < 4]
-        found = groups_by_torque(scene, told, self.unloaded) if told else ()
+        determined = [k for k in shown_of(scene.robot, BODY_COLUMNS, BODY_COLUMN_SHARE) if k < 4]
+        found = groups_by_torque(scene, determined, self.unloaded) if determined else ()
         return tuple(self.in_recordings(scene, Member(None), group) for group in found)
 
     def in_recordings(self, scene: Scene, member: Member, names: frozenset[str]) -> Member:
@@ -195,7 +195,7 @@ class PayloadOfRecordings(Effect):
         meaning = "{} of a payload in the frame of the last joint"
         return tuple(
             Column(f"payload_{BODY_PARAMETERS[k]}", None, BODY_UNITS[k], meaning.format(BODY_PARAMETERS[k]))
-            for k in self._told(scene.robot)
+            for k in self._determined(scene.robot)
         )
 
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
@@ -203,7 +203,7 @@ class PayloadOfRecordings(Effect):
         names = list(signals.scene.start)
         name = signals.motion.name
         if name not in names or not member.partner_place >> names.index(name) & 1:
-            return np.zeros((len(self._told(signals.scene.robot)), *signals.motion.q.shape))
+            return np.zeros((len(self._determined(signals.scene.robot)), *signals.motion.q.shape))
         return self.carried(signals, member)
 
     def carried(self, signals: Signals, member: Member) -> Iterable[Array]:
@@ -211,26 +211,26 @@ class PayloadOfRecordings(Effect):
         return (
             [_at_tool(signals)]
             if self.at_tool
-            else np.moveaxis(body_columns(signals, self._told(signals.scene.robot)), 1, 0)
+            else np.moveaxis(body_columns(signals, self._determined(signals.scene.robot)), 1, 0)
         )
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """Say so where the mass is negative, or more than the arm weighs."""
-        if self._told(scene.robot)[0] != 0:
+        if self._determined(scene.robot)[0] != 0:
             return None
         if value[0] < -SEEN_STDS * std[0]:
-            if _short_of_body(self._told(scene.robot), -value, std):
+            if _short_of_body(self._determined(scene.robot), -value, std):
                 return "its mass would be negative, and no body taken off has such moments: these recordings differ by something else too"
             return "its mass would be negative: these recordings carry less than the others, or differ by no body"
         return _too_heavy(scene, float(value[0]), float(std[0]))
 
     def essential(self, scene: Scene, member: Member) -> slice:
         """Return the mass where the torque tells it: a body has one, and runs that differ seem to turn without any."""
-        return slice(0, 1) if self._told(scene.robot)[0] == 0 else slice(None)
+        return slice(0, 1) if self._determined(scene.robot)[0] == 0 else slice(None)
 
     def parameters(self, scene: Scene, member: Member, value: Array, covariance: Array) -> Mapping[str, Parameter]:
         """Return mass and centre of mass where they can be told, and the body's standard parameters."""
-        shown = self._told(scene.robot)
+        shown = self._determined(scene.robot)
         plain = super().parameters(scene, member, value, covariance).values()
         found = {"mass" if k == 0 else BODY_PARAMETERS[k]: item for k, item in zip(shown, plain, strict=True)}
         if shown[0] == 0 and value[0] > SEEN_STDS * deviation(covariance):
@@ -243,7 +243,7 @@ class PayloadOfRecordings(Effect):
                     found[f"com_{axis}"] = Parameter(float(value[place] / value[0]), deviation(spread), "m")
         return found
 
-    def _told(self, robot: Robot) -> tuple[int, ...]:
+    def _determined(self, robot: Robot) -> tuple[int, ...]:
         """Return the standard parameters that are estimated."""
         return (0,) if self.at_tool else shown_of(robot, BODY_COLUMNS, BODY_COLUMN_SHARE)
 

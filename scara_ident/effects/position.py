@@ -81,8 +81,8 @@ class Spring(Effect):
 
     def description(self, scene: Scene, member: Member) -> str:
         """Say that an offset would look the same as another rest position."""
-        told = ", whose rest position holds if the joint has no torque offset"
-        return self.summary + ("" if offset_of(scene, member.place) is None else told)
+        caveat = ", whose rest position holds if the joint has no torque offset"
+        return self.summary + ("" if offset_of(scene, member.place) is None else caveat)
 
     def or_else(self, scene: Scene, member: Member, value: Array) -> str:
         """Say what else it may be on a joint that goes up and down."""

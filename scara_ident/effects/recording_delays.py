@@ -93,7 +93,7 @@ class DelayOfEachRecording(TimeDelay):
     def of_torque(self, signals: Signals, member: Member, torque: Array) -> None:
         """Return nothing: what else is fitted may jump where friction does."""
 
-    def told_apart_from(self, scene: Scene, member: Member) -> tuple[()]:
+    def distinguished_from(self, scene: Scene, member: Member) -> tuple[()]:
         """Return nothing: when friction turns is in no column of it."""
         return ()
 

@@ -53,14 +53,14 @@ def scale_groups(term: RigidBody, moving: tuple[bool, ...]) -> tuple[tuple[int, 
     basis = left[:, singular > ROUNDING * singular[0]]
     outside = alone - basis @ (basis.T @ alone)
     share = np.linalg.norm(outside, axis=0)
-    told = np.flatnonzero(share**2 >= ABSORBED)
-    _, singular, right = np.linalg.svd(outside[:, told] / share[told], full_matrices=False)
+    determined = np.flatnonzero(share**2 >= ABSORBED)
+    _, singular, right = np.linalg.svd(outside[:, determined] / share[determined], full_matrices=False)
     null = right[singular <= ROUNDING * max(singular, default=0.0)]
     common = null.T @ null
-    groups = [(j,) for j in range(robot.n) if j not in told]
-    for place, j in enumerate(told):
+    groups = [(j,) for j in range(robot.n) if j not in determined]
+    for place, j in enumerate(determined):
         own = np.abs(common[place]) > TOGETHER * np.sqrt(common[place, place] * np.diag(common))
         own[place] = True
-        if told[own][:1].tolist() == [j]:
-            groups.append(tuple(told[own].tolist()))
+        if determined[own][:1].tolist() == [j]:
+            groups.append(tuple(determined[own].tolist()))
     return tuple(sorted(groups))

@@ -110,8 +110,8 @@ class Scene:
 
     def armature(self, joint: int) -> float:
         """Armature N^2 Jm of a joint: what the data tell of it, else its nominal value."""
-        told = self.told_armature(joint)
-        return self.armatures.get(joint, self.nominal_armature(joint)) if told is None else told
+        known = self.known_armature(joint)
+        return self.armatures.get(joint, self.nominal_armature(joint)) if known is None else known
 
     def nominal_armature(self, joint: int) -> float:
         """Armature N^2 Jm of a joint as the robot's description has it, else guessed (`Robot.rotor_guess`)."""
@@ -119,7 +119,7 @@ class Scene:
             return float(self.robot.rotor_guess.armature[joint])
         return float(self.robot.reduction[joint] ** 2 * self.robot.rotor_inertia[joint])
 
-    def told_armature(self, joint: int) -> float | None:
+    def known_armature(self, joint: int) -> float | None:
         """Armature N^2 Jm of a joint where the base model tells it apart from the links, else None."""
         slopes = self.armature_slopes(joint)
         return float(slopes @ self.value[self.model.place(self.model.rigid_body)]) if np.any(slopes) else None

@@ -207,10 +207,10 @@ class InitialState:
         normal = self._seen @ self._seen.T
         # What cannot be seen stays as assumed.
         normal += np.diag(UNSEEN * (self._strength @ sizes) / sizes)
-        told = np.linalg.inv(normal)
+        normal_inverse = np.linalg.inv(normal)
         # Once more on what that leaves: of what is seen a thousandth would stay as assumed, for as long as it swings.
-        once = left @ self._seen.T @ told
-        return np.asarray(once + (left - once @ self._seen) @ self._seen.T @ told)
+        once = left @ self._seen.T @ normal_inverse
+        return np.asarray(once + (left - once @ self._seen) @ self._seen.T @ normal_inverse)
 
     def added(self, lag: Lag, state: Array) -> Lag:
         """Return x and its derivatives with the swing that a state at the first sample makes."""

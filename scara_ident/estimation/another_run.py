@@ -30,7 +30,7 @@ def of_another_run(variation: RunVariation, observations: Observations, value: A
         N m (N); zero where runs do not differ, or no samples are kept.
     """
     found = np.zeros(len(variation.joints))
-    for joint, std, directions in _told(variation, observations, value):
+    for joint, std, directions in _differing(variation, observations, value):
         found[joint] = np.sqrt(np.sum(std[:, None] ** 2 * directions**2) / observations.joints[joint].samples)
     return found
 
@@ -53,7 +53,7 @@ def variance_of_another_run(
         Each run being one draw of each kind of difference.
     """
     total, runs = 0.0, len(observations.data.recordings)
-    for joint, std, directions in _told(variation, observations, value):
+    for joint, std, directions in _differing(variation, observations, value):
         run = np.repeat(observations.owner, np.diff(observations.joints[joint].starts))
         for size, direction in zip(std, directions, strict=True):
             total += float(np.sum((size * np.bincount(run, direction * signals[joint], runs)) ** 2))
@@ -78,7 +78,7 @@ def left_beside_own(
     lengths = [np.diff(rows.starts) for rows in observations.joints]
     sizes = [np.ones(int(each.sum())) if shares is None else np.repeat(np.sqrt(shares), each) for each in lengths]
     left = [size * rows.left(value) for size, rows in zip(sizes, observations.joints, strict=True)]
-    for joint, std, directions in _told(variation, observations, value):
+    for joint, std, directions in _differing(variation, observations, value):
         run = np.repeat(observations.owner, lengths[joint])
         differing = (sizes[joint] * directions[std > 0.0]).T
         for one in np.unique(run[sizes[joint] > 0.0]):
@@ -93,7 +93,7 @@ def left_beside_own(
     return tuple(left)
 
 
-def _told(variation: RunVariation, observations: Observations, value: Array) -> Iterator[tuple[int, Array, Array]]:
+def _differing(variation: RunVariation, observations: Observations, value: Array) -> Iterator[tuple[int, Array, Array]]:
     """Give joints on which runs differ, by which standard deviation, and what one unit of each does on their rows."""
     if not observations.raw:
         return

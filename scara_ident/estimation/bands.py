@@ -91,7 +91,7 @@ def choose_bands(model: TorqueModel, data: PreparedData) -> BandChoice:
             least = floor if fit is None else np.maximum(floor, bands)
             bands, fit = _widened(Spectra(model, level, edges), bands, least, allowed, fit)
         if allowed >= highest or np.max(bands) < NEAR_HIGHEST * allowed:
-            return _told(model, bands, fit, edges, floor, moving)
+            return _choice(model, bands, fit, edges, floor, moving)
         rate *= NEXT_RATE
 
 
@@ -117,7 +117,7 @@ def _widened(
         fit = spectra.fit(bands)
 
 
-def _told(model: TorqueModel, bands: Array, fit: Explained, edges: Array, floor: Array, moving: Array) -> BandChoice:
+def _choice(model: TorqueModel, bands: Array, fit: Explained, edges: Array, floor: Array, moving: Array) -> BandChoice:
     """Return the choice with what a person should know of it."""
     place = np.clip(np.searchsorted(edges, bands * (1.0 - 1e-9)) - 1, 0, fit.shares.shape[1] - 1)
     some = fit.explains > 0.0

@@ -143,17 +143,17 @@ def _of_white(products: Array, root: Array, follows: NDArray[np.bool_]) -> tuple
     variance = np.sum(root**2, axis=1)
     opposed, squares, neighbours = (np.zeros(len(root)) for _ in range(3))
     # Those of the block before; nothing precedes the first.
-    before, told_before = np.zeros_like(root.T), np.zeros(len(root))
+    before, leverages_before = np.zeros_like(root.T), np.zeros(len(root))
     follows = np.append(False, follows)
     for first in range(0, len(products), BLOCKS_AT_ONCE):
         pulls = products[first : first + BLOCKS_AT_ONCE] @ root.T
-        told = np.einsum("pr,brp->bp", root, pulls)
+        leverages = np.einsum("pr,brp->bp", root, pulls)
         after = follows[first : first + BLOCKS_AT_ONCE].astype(float)
         earlier = np.concatenate([before[None], pulls[:-1]])
         opposed += np.einsum("b,brp,brp->p", after, pulls, earlier)
-        squares += np.sum(told**2, axis=0)
-        neighbours += after @ (told * np.concatenate([told_before[None], told[:-1]]))
-        before, told_before = pulls[-1], told[-1]
+        squares += np.sum(leverages**2, axis=0)
+        neighbours += after @ (leverages * np.concatenate([leverages_before[None], leverages[:-1]]))
+        before, leverages_before = pulls[-1], leverages[-1]
     some = variance > 0.0
     share = 1.0 - np.divide(opposed, variance, out=np.zeros(len(root)), where=some)
     freedom = np.divide(variance**2, squares + 0.5 * neighbours, out=np.ones(len(root)), where=some)

@@ -54,7 +54,7 @@ class JointError:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Estimate(Saved, told_by="estimate"):
+class Estimate(Saved, reported_by="estimate"):
     """Parameters of a model and how sure they are.
 
     Attributes

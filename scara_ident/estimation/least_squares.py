@@ -18,7 +18,7 @@ from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.run_offsets import OffsetRows, beside_offsets, larger_offsets, offsets_on
 from scara_ident.estimation.run_variation import MIN_RUNS, RunVariation
 from scara_ident.estimation.variation_between import run_variation
-from scara_ident.estimation.working_range import Told, told_directions
+from scara_ident.estimation.working_range import DeterminedDirections, determined_directions
 from scara_ident.threads import one_blas_thread, side_by_side
 
 # Weights of the joints' rows, shape (n,), from all of them.
@@ -112,11 +112,11 @@ class _Fit:
     value: Array
     undetermined: NDArray[np.bool_]
     inverse: Array
-    told: Told | None
+    directions: DeterminedDirections | None
 
 
 def _fit(observations: Observations, weigh: Weigh, method: str, prior: Information | None) -> _Fit:
-    """Solve; with weights and without a prior, what data leave open of the torque is left at zero, see `told_directions`."""
+    """Solve; with weights and without a prior, what data leave open of the torque is left at zero, see `determined_directions`."""
     joints = _joints(observations)
     weights = weigh(joints)
     information = weighted(joints, weights)
@@ -124,16 +124,18 @@ def _fit(observations: Observations, weigh: Weigh, method: str, prior: Informati
         information = merge([information, prior])
     solution = information.solve()
     # Equal weights stay what they are in the literature, the paper's among it.
-    told = (
-        told_directions(observations, residual_noise(joints, solution.value))
+    directions = (
+        determined_directions(observations, residual_noise(joints, solution.value))
         if prior is None and method == "wls"
         else None
     )
-    if told is None:
+    if directions is None:
         return _Fit(weights, information, solution.value, solution.undetermined, information.inverse(), None)
-    within = told.within(information)
-    inverse = told.kept @ within.inverse() @ told.kept.T
-    return _Fit(weights, information, told.kept @ within.solve().value, told.undetermined, inverse, told)
+    within = directions.within(information)
+    inverse = directions.kept @ within.inverse() @ directions.kept.T
+    return _Fit(
+        weights, information, directions.kept @ within.solve().value, directions.undetermined, inverse, directions
+    )
 
 
 @one_blas_thread()
@@ -175,8 +177,8 @@ def least_squares(
         # What else two runs might differ by is not told.
         variation = variation.offsets or RunVariation((None,) * len(observations.joints))
     bias = None
-    if fit.told is not None:
-        covariance += fit.told.prior
+    if fit.directions is not None:
+        covariance += fit.directions.prior
     elif prior is None:
         bias = noise_bias(observations, fit.weights, fit.value if rows.offsets is None else None)
     if bias is not None:
@@ -232,7 +234,9 @@ def value_and_weights(observations: Observations, offsets: RunVariation | None =
 
 
 @one_blas_thread()
-def told_value_and_weights(observations: Observations, offsets: RunVariation | None = None) -> tuple[Array, Array]:
+def determined_value_and_weights(
+    observations: Observations, offsets: RunVariation | None = None
+) -> tuple[Array, Array]:
     """Return the same with what data leave open of the torque within the arm's limits at zero, as `wls` leaves it.
 
     Parameters

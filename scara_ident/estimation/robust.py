@@ -20,7 +20,7 @@ from scara_ident.estimation.estimate import Estimate
 from scara_ident.estimation.information import Information, joint_noise, orthonormal, weighted
 from scara_ident.estimation.joint_rows import JointRows, block_products
 from scara_ident.estimation.observations import Observations
-from scara_ident.estimation.working_range import told_directions
+from scara_ident.estimation.working_range import determined_directions
 from scara_ident.manners import listed
 from scara_ident.threads import one_blas_thread, side_by_side
 
@@ -77,10 +77,10 @@ def robust_fit(observations: Observations) -> RobustFit:
     weights = [np.ones(len(joint.rows)) for joint in joints]
     point = _reweighted(joints, weights, noise, np.zeros(root.shape[1]), _huber, HUBER_ROUNDS)
     # Where no event steers the noise any more, what data leave open is left at zero, as by `wls`.
-    told = told_directions(observations, noise)
-    if told is not None:
-        kept, sizes = np.linalg.qr((whole @ root).T @ (whole @ told.kept))
-        root, point = np.linalg.solve(sizes.T, told.kept.T).T, kept.T @ point
+    directions = determined_directions(observations, noise)
+    if directions is not None:
+        kept, sizes = np.linalg.qr((whole @ root).T @ (whole @ directions.kept))
+        root, point = np.linalg.solve(sizes.T, directions.kept.T).T, kept.T @ point
         joints = [replace(joint, own=joint.own @ kept) for joint in joints]
     point = _reweighted(joints, weights, noise, point, _tukey, TUKEY_ROUNDS)
     return RobustFit(root @ _solved(joints, weights, noise, point), noise, tuple(weights))

@@ -206,9 +206,9 @@ class RunVariation:
 
     def without(self, kind: int) -> RunVariation:
         """Return the same without a kind."""
-        told = np.arange(len(KINDS)) != kind
+        determined = np.arange(len(KINDS)) != kind
         joints = [
-            None if item is None else replace(item, std=item.std * told, of_run=item.of_run * told)
+            None if item is None else replace(item, std=item.std * determined, of_run=item.of_run * determined)
             for item in self.joints
         ]
         return replace(self, joints=tuple(joints))
@@ -317,12 +317,12 @@ class RunVariation:
     @cached_property
     def days(self) -> NDArray[np.intp] | None:
         """Which runs share their offsets on all joints, see `same_day`."""
-        told = [item for item in self.joints if item is not None and item.std[OFFSET] > 0.0]
-        if not told:
+        determined = [item for item in self.joints if item is not None and item.std[OFFSET] > 0.0]
+        if not determined:
             return None
-        offsets = np.array([item.of_run[:, OFFSET] for item in told])
-        unsure = np.array([item.unsure[:, OFFSET] for item in told])
-        return same_day(offsets, unsure, np.array([item.std[OFFSET] for item in told]))
+        offsets = np.array([item.of_run[:, OFFSET] for item in determined])
+        unsure = np.array([item.unsure[:, OFFSET] for item in determined])
+        return same_day(offsets, unsure, np.array([item.std[OFFSET] for item in determined]))
 
 
 def late_alike(item: JointVariation) -> float:

@@ -99,11 +99,11 @@ def shared_delays(
 
 def _pooled(late: Array, precision: Array, shares: Array) -> SharedDelays | None:
     """Pool delays of recordings and their precision, shape (joints, runs) each."""
-    told = np.sum(precision, axis=0) > 0.0
-    if np.count_nonzero(told) < 2:
+    determined = np.sum(precision, axis=0) > 0.0
+    if np.count_nonzero(determined) < 2:
         return None
     joints = np.sum(precision, axis=1) > 0.0
-    late, precision = late[np.ix_(joints, told)], precision[np.ix_(joints, told)]
+    late, precision = late[np.ix_(joints, determined)], precision[np.ix_(joints, determined)]
     whole, weight = np.sum(precision, axis=1), np.sum(precision, axis=0)
     alone = np.sum(precision * late, axis=1) / whole
     # What is left of the runs' own precision once every joint has a constant of its own, and what it is aimed at.
@@ -115,8 +115,8 @@ def _pooled(late: Array, precision: Array, shares: Array) -> SharedDelays | None
     disagreement = float(np.sum(precision * (late - alone[:, None]) ** 2)) - apart
     scatter = max(1.0, disagreement / freedom) if freedom > 0 else 1.0
     std = float(np.sqrt(max(0.0, apart - own * scatter) / np.trace(between)))
-    of_run = np.full(len(told), np.nan)
-    of_run[told] = off - np.sum(weight * off) / np.sum(weight)
+    of_run = np.full(len(determined), np.nan)
+    of_run[determined] = off - np.sum(weight * off) / np.sum(weight)
     chance = _chance(apart / scatter, own, freedom)
     return SharedDelays(of_run, std, chance, std * float(np.max(shares)))
 

@@ -37,7 +37,7 @@ class JointScale:
     ----------
     scale : float
         The first as a multiple of the second.
-    told : bool
+    significant : bool
         Whether the scale is told from zero.
     sure : bool
         Whether what is left is told from zero.
@@ -48,7 +48,7 @@ class JointScale:
     """
 
     scale: float
-    told: bool
+    significant: bool
     sure: bool
     left: float
     torque: float = np.nan
@@ -68,7 +68,7 @@ def urdf_scale(estimate: Estimate, observations: Observations) -> dict[str, floa
         torque is not that of the URDF in any scale.
     """
     each = joint_scales(estimate, observations)
-    return {joint: own.scale for joint, own in each.items() if own.told and own.left < MAX_UNEXPLAINED}
+    return {joint: own.scale for joint, own in each.items() if own.significant and own.left < MAX_UNEXPLAINED}
 
 
 def unlike_urdf(estimate: Estimate, observations: Observations) -> tuple[str, ...]:

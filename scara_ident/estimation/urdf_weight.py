@@ -1,6 +1,6 @@
 """What the weight of the identified bodies says beside their inertia: one gain scales both, a counterweight does not.
 
-And whether rotors are as stated; with `told_scale`, which says how all of that compares with the URDF.
+And whether rotors are as stated; with `scale_in_words`, which says how all of that compares with the URDF.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class WeightScale:
     inertia: float
 
 
-def told_scale(estimate: Estimate, observations: Observations) -> str:
+def scale_in_words(estimate: Estimate, observations: Observations) -> str:
     """Say how the scale of the identified bodies compares with the URDF's."""
     seen = estimate, observations
     scales, slight, loaded = urdf_scale(*seen), slight_joints(*seen), otherwise_loaded(*seen)

@@ -105,8 +105,8 @@ def variation_between(
 
     sums = side_by_side(of_joint, range(len(joints)), joints)
     lost = np.ones(len(joints)) if taken is None else taken
-    told = [(item, off) for item, off in zip(sums, lost, strict=True) if item is not None]
-    estimated = iter(_estimated(*zip(*told, strict=True)) if told else ())
+    determined = [(item, off) for item, off in zip(sums, lost, strict=True) if item is not None]
+    estimated = iter(_estimated(*zip(*determined, strict=True)) if determined else ())
     found = [None if item is None else next(estimated) for item in sums]
     reaches = [np.inf if band is None else 1.0 / (2.0 * np.pi * band) for band in observations.data.bands]
     pairs = zip(found, reaches, strict=True)
@@ -132,21 +132,21 @@ def _shared(
         return _sums(directions, rows.left(value), rows.starts, firsts)
 
     pairs = zip(side_by_side(of_joint, range(len(joints)), joints), found.joints, strict=True)
-    told = [(own, item) for own, item in pairs if own is not None and own.back[DELAY] > 0.0]
-    if not told:
+    determined = [(own, item) for own, item in pairs if own is not None and own.back[DELAY] > 0.0]
+    if not determined:
         return None
     kinds = len(KINDS)
-    priors = np.zeros((len(told), kinds + FREE))
-    for place, (own, item) in enumerate(told):
+    priors = np.zeros((len(determined), kinds + FREE))
+    for place, (own, item) in enumerate(determined):
         if item is not None:
             priors[place, :kinds] = (item.std / np.where(own.back[:kinds] > 0.0, own.back[:kinds], np.inf)) ** 2
         priors[place, kinds:] = np.where(own.back[kinds:] > 0.0, np.inf, 0.0)
-    rms = np.array([np.sqrt(np.mean(own.directions**2, axis=1)) for own, _ in told])
+    rms = np.array([np.sqrt(np.mean(own.directions**2, axis=1)) for own, _ in determined])
     return shared_delays(
-        np.array([own.products for own, _ in told]),
-        np.array([own.aims for own, _ in told]),
+        np.array([own.products for own, _ in determined]),
+        np.array([own.aims for own, _ in determined]),
         priors,
-        np.array([own.back[DELAY] for own, _ in told]),
+        np.array([own.back[DELAY] for own, _ in determined]),
         DELAY,
         rms[:, DELAY] / np.maximum(rms[:, SCALE], np.finfo(float).tiny),
         pieces,
@@ -213,15 +213,15 @@ def _estimated(joints: Sequence[_Sums], taken: Sequence[float]) -> list[JointVar
     """Return how runs differ on each of some joints, of which parameters take up so many offsets."""
     products, aims = np.array([item.products for item in joints]), np.array([item.aims for item in joints])
     runs = aims.shape[1]
-    told = np.array([item.back > 0.0 for item in joints])
+    determined = np.array([item.back > 0.0 for item in joints])
     if runs < MIN_RUNS:
-        told &= np.arange(len(KINDS)) == OFFSET
+        determined &= np.arange(len(KINDS)) == OFFSET
     # Parameters are fitted to all runs, so that these lie about their own mean.
-    draws = np.full(told.shape, runs - 1.0)
+    draws = np.full(determined.shape, runs - 1.0)
     draws[:, OFFSET] = np.clip(runs - np.array(taken), 1.0, runs - 1.0)
     # What chance explains is asked with as many rows as are independent; what it does not is as large as runs lie apart.
     passed = np.array([item.passed for item in joints])[:, None, None]
-    differ = differing(products / passed[..., None], aims / passed, told, draws)
+    differ = differing(products / passed[..., None], aims / passed, determined, draws)
     variances = components(products, aims, differ, draws)
     means, unsure = expected(products, aims, variances)
     return [

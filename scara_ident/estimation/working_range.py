@@ -39,7 +39,7 @@ SAME = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class Told:
+class DeterminedDirections:
     """Directions of parameters, scaled so that their torque over the arm's range is the drives' (rms over states).
 
     Attributes
@@ -56,8 +56,8 @@ class Told:
     @property
     def undetermined(self) -> NDArray[np.bool_]:
         """Parameters that are mostly left open, shape (p,)."""
-        open_, told = np.sum(self.left_open**2, axis=1), np.sum(self.kept**2, axis=1)
-        return np.asarray(open_ > OPEN_SHARE * (open_ + told))
+        open_, kept = np.sum(self.left_open**2, axis=1), np.sum(self.kept**2, axis=1)
+        return np.asarray(open_ > OPEN_SHARE * (open_ + kept))
 
     @property
     def prior(self) -> Array:
@@ -70,7 +70,7 @@ class Told:
         return Information(triangular(rows), information.rows)
 
 
-def told_directions(observations: Observations, noise: Array) -> Told | None:
+def determined_directions(observations: Observations, noise: Array) -> DeterminedDirections | None:
     """Tell directions that data determine from those that they leave open.
 
     Parameters
@@ -100,7 +100,7 @@ def told_directions(observations: Observations, noise: Array) -> Told | None:
         return None
     unknown = np.append(~known, np.ones(parameters - some, dtype=bool))
     directions = range_ @ right.T
-    return Told(directions[:, ~unknown], directions[:, unknown])
+    return DeterminedDirections(directions[:, ~unknown], directions[:, unknown])
 
 
 def believable(observations: Observations, value: Array, noise: Array) -> Array:

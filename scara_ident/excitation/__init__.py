@@ -5,7 +5,7 @@ from scara_ident.excitation.curves import Basis, ExcitationTrajectory, make_basi
 from scara_ident.excitation.design import Design, design_excitation, information_of
 from scara_ident.excitation.limits import InfeasibleLimits, Limits, limits_of, nominal_parameters
 from scara_ident.excitation.output import excitation_dict, write_joint_trajectory, write_trajectory
-from scara_ident.excitation.promise import Told, told
+from scara_ident.excitation.promise import ExpectedAnswer, expected_answers
 from scara_ident.excitation.search import Effort, Progress
 from scara_ident.excitation.size import default_harmonics
 from scara_ident.excitation.verification import Reached
@@ -23,7 +23,7 @@ __all__ = [
     "LogDet",
     "Progress",
     "Reached",
-    "Told",
+    "ExpectedAnswer",
     "block_of",
     "default_harmonics",
     "design_excitation",
@@ -32,7 +32,7 @@ __all__ = [
     "limits_of",
     "make_basis",
     "nominal_parameters",
-    "told",
+    "expected_answers",
     "write_joint_trajectory",
     "write_trajectory",
 ]

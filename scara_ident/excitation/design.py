@@ -18,7 +18,7 @@ from scara_ident.excitation.curves import ExcitationTrajectory, Family, make_bas
 from scara_ident.excitation.judge import motion_of
 from scara_ident.excitation.limits import Limits, limits_of, nominal_parameters, resting_posture, without_coulomb
 from scara_ident.excitation.problem import NARROWEST, Task, speed_within
-from scara_ident.excitation.promise import FINE_RATE, Told, told
+from scara_ident.excitation.promise import FINE_RATE, ExpectedAnswer, expected_answers
 from scara_ident.excitation.search import Effort, Progress, search
 from scara_ident.excitation.sensitivity import SmoothModel
 from scara_ident.excitation.size import SAMPLES, check_size, default_harmonics, durations_of, harmonics_of
@@ -32,7 +32,7 @@ from scara_ident.threads import one_blas_thread
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Design(Saved, told_by="design"):
+class Design(Saved, reported_by="design"):
     """Trajectories with what they promise.
 
     Attributes
@@ -78,7 +78,7 @@ class Design(Saved, told_by="design"):
     costs: tuple[float, ...]
     effort: Effort
     seconds: float
-    tells: tuple[Told, ...] = ()
+    tells: tuple[ExpectedAnswer, ...] = ()
 
     def _in_short(self) -> str:
         names = ", ".join(each.name for each in self.trajectories)
@@ -281,7 +281,9 @@ def design_excitation(
         costs=found.costs,
         effort=effort,
         seconds=time.perf_counter() - begun,
-        tells=() if tell is None else told(inquiry, [motion_of(task.bases[0], task.posture, found.x[0], FINE_RATE)]),
+        tells=()
+        if tell is None
+        else expected_answers(inquiry, [motion_of(task.bases[0], task.posture, found.x[0], FINE_RATE)]),
     )
 
 

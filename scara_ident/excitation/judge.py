@@ -115,8 +115,8 @@ class _Worth:
         rest = [item.kind != "below_limit" for item in asked]
         if any(rest):
             sizes[rest] = self.inquiry.sigmas(rows.information, [*compress(asked, rest)]) / SURE
-        told = float(self.weights @ np.log((1.0 + sizes**2) / (1.0 + (sizes / ENOUGH) ** 2)))
-        return -told - (0.0 if all(rest) else WEIGHTS["below_limit"] * self._of_the_rest(rows.information))
+        information = float(self.weights @ np.log((1.0 + sizes**2) / (1.0 + (sizes / ENOUGH) ** 2)))
+        return -information - (0.0 if all(rest) else WEIGHTS["below_limit"] * self._of_the_rest(rows.information))
 
     def _of_the_rest(self, rows: Information) -> float:
         """Return the mean logarithm of the squares that tell a parameter of the model.

@@ -270,15 +270,15 @@ def notes(design: Design) -> list[str]:
 
 def _foreseen(design: Design) -> str:
     model = design.model
-    told = "Torques were foreseen with the URDF's bodies and rotors"
+    foreseen = "Torques were foreseen with the URDF's bodies and rotors"
     if not np.any(np.delete(design.nominal, np.r_[model.place(model.rigid_body)])):
         if lacking := _rotors_left_out(design):
-            told = f"Torques were foreseen with the URDF's bodies, without {lacking}"
-        return f"{told}, without friction: identify once, and give what was found."
+            foreseen = f"Torques were foreseen with the URDF's bodies, without {lacking}"
+        return f"{foreseen}, without friction: identify once, and give what was found."
     own = scara03_friction(model.robot)
     if own and all(own[name] == value for name, value in zip(model.names, design.nominal, strict=True) if name in own):
-        return f"{told} and the friction of the paper's Table 5 (OJD)."
-    return f"{told}, or what was known better, and the friction that was given."
+        return f"{foreseen} and the friction of the paper's Table 5 (OJD)."
+    return f"{foreseen}, or what was known better, and the friction that was given."
 
 
 def _rotors_left_out(design: Design) -> str:

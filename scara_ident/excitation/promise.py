@@ -48,7 +48,7 @@ class Shown:
 
 
 @dataclass(frozen=True)
-class Told:
+class ExpectedAnswer:
     """What a motion tells of a question.
 
     Attributes
@@ -128,7 +128,7 @@ def _size(limit: Mapping[str, Parameter]) -> str:
     )
 
 
-def told(inquiry: Inquiry, motions: Sequence[Motion]) -> tuple[Told, ...]:
+def expected_answers(inquiry: Inquiry, motions: Sequence[Motion]) -> tuple[ExpectedAnswer, ...]:
     """Return what motions tell of every question, beside what is known."""
     rows = all_rows(inquiry, motions)
     times, after = believed(inquiry, rows), inquiry.sigmas(rows.information)
@@ -137,7 +137,7 @@ def told(inquiry: Inquiry, motions: Sequence[Motion]) -> tuple[Told, ...]:
         asked = item.suspects if item.kind == "below_limit" else ()
         shown = (Shown(own, times[own.label], _least(inquiry.scene, own, times[own.label])) for own in asked)
         untried = tuple(own for own in item.suspects if own.candidate.member in own.candidate.effect.doubtful(scene))
-        found.append(Told(item, float(one), float(other), tuple(shown), untried))
+        found.append(ExpectedAnswer(item, float(one), float(other), tuple(shown), untried))
     return tuple(found)
 
 

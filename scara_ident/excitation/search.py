@@ -118,7 +118,7 @@ def search(task: Task, effort: Effort, progress: Callable[[Progress], None] | No
     InfeasibleLimits
         If no motion, or none within the limits, shows all parameters.
     """
-    alike = _told_apart_by_nothing(task)
+    alike = _never_distinguished(task)
     if alike:
         raise InfeasibleLimits(
             f"no motion can tell {', '.join(alike)} apart in the model {task.smooth.model.name}; use a model without "
@@ -265,7 +265,7 @@ def _tightest(problem: Problem, seed: int) -> str:
     )
 
 
-def _told_apart_by_nothing(task: Task) -> list[str]:
+def _never_distinguished(task: Task) -> list[str]:
     """Return the parameters of combinations that the regressor of no state shows, and that nobody told."""
     model, limits = task.smooth.model, task.limits
     random = np.random.default_rng(0)

@@ -147,13 +147,13 @@ def _number(value: float | None) -> str:
 Parts = tuple[dict[str, str], Said | None, tuple[str, ...]]
 
 
-def _urdf(found: IdentifiedModel, standard: Array, alone: Said, *, rotors_told: bool = False) -> Parts:
-    text, notes = urdf_text(found.robot, standard, friction_said(found, alone.value), rotors_told=rotors_told)
+def _urdf(found: IdentifiedModel, standard: Array, alone: Said, *, rotors_reported: bool = False) -> Parts:
+    text, notes = urdf_text(found.robot, standard, friction_said(found, alone.value), rotors_reported=rotors_reported)
     return {f"{_stem(found)}.urdf": text}, None, notes
 
 
 def _ros2(found: IdentifiedModel, standard: Array, alone: Said) -> Parts:
-    text, notes = urdf_text(found.robot, standard, rotors_told=True)
+    text, notes = urdf_text(found.robot, standard, rotors_reported=True)
     urdf = f"{_stem(found)}.urdf"
     armature = standard[10 * found.robot.n :]
     name = f"{c_name(found.robot.name)}_ros2.yaml"
@@ -162,7 +162,7 @@ def _ros2(found: IdentifiedModel, standard: Array, alone: Said) -> Parts:
 
 
 def _pinocchio(found: IdentifiedModel, standard: Array, alone: Said) -> Parts:
-    files, _, notes = _urdf(found, standard, alone, rotors_told=True)
+    files, _, notes = _urdf(found, standard, alone, rotors_reported=True)
     beside = said_by(with_code(FORMS["pinocchio"]), found, standard)
     friction, further = _divided(found, beside.value, offset=True)
     module = pinocchio_module(

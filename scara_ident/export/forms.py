@@ -129,9 +129,9 @@ def said_by(form: Form, found: IdentifiedModel, standard: Array | None = None) -
     for term in held:
         value[absent[term]] = 0.0
     if standard is not None and not form.armature and np.any(standard[10 * found.robot.n :]):
-        missing_names = (("armature", NOT_READ), *_told(found, missing))
+        missing_names = (("armature", NOT_READ), *_missing_names(found, missing))
     else:
-        missing_names = tuple(_told(found, missing))
+        missing_names = tuple(_missing_names(found, missing))
     return Said(value, missing_names, refitted)
 
 
@@ -191,7 +191,7 @@ def _has(form: Form, power: int) -> bool:
     return form.powers is None or power in form.powers
 
 
-def _told(found: IdentifiedModel, missing: Sequence[tuple[Term, list[int], str]]) -> Iterator[tuple[str, str]]:
+def _missing_names(found: IdentifiedModel, missing: Sequence[tuple[Term, list[int], str]]) -> Iterator[tuple[str, str]]:
     """Give what is missing by name."""
     for term, columns, why in missing:
         if isinstance(term, EffectTerm):
@@ -221,9 +221,9 @@ def _adjustable(form: Form, found: IdentifiedModel) -> tuple[NDArray[np.intp], A
                 places.append(start + k)
                 lower.append(0.0 if form.bodies and form.powers is not None and friction else -np.inf)
     kept = np.array(places, dtype=np.intp)
-    told = ~found.information.select(kept).solve().undetermined if len(kept) else np.zeros(0, dtype=bool)
-    told |= ~found.undetermined[kept]
-    return kept[told], np.array(lower)[told]
+    determined = ~found.information.select(kept).solve().undetermined if len(kept) else np.zeros(0, dtype=bool)
+    determined |= ~found.undetermined[kept]
+    return kept[determined], np.array(lower)[determined]
 
 
 def _fitted(information: Information, value: Array, places: NDArray[np.intp], lower: Array) -> Array:

@@ -91,10 +91,10 @@ class IdentifiedModel:
     @property
     def doubts(self) -> tuple[str, ...]:
         """In words, which of the effects found the recordings held out speak against."""
-        told = [(item, HeldOutGain.of_entry(item["held_out"])) for item in self.found if item.get("held_out")]
+        with_gain = [(item, HeldOutGain.of_entry(item["held_out"])) for item in self.found if item.get("held_out")]
         return tuple(
             f"{item['effect']}{' of ' + item['joint'] if item['joint'] else ''} is in doubt: {shown_of(gain)} on the recordings held out"
-            for item, gain in told
+            for item, gain in with_gain
             if gain.against()
         )
 

@@ -95,8 +95,8 @@ def _model_of(
     base = build_model(arm, content["model"])
     model = _with_effects(base, known, path)
     parameters = content["parameters"]
-    told = [(item["name"], item["joint"], item["meaning"]) for item in parameters]
-    if told != [(column.name, column.joint, column.meaning) for column in model.columns]:
+    entries = [(item["name"], item["joint"], item["meaning"]) for item in parameters]
+    if entries != [(column.name, column.joint, column.meaning) for column in model.columns]:
         raise ScaraIdentError(
             f"{path}: its parameters are not those of {arm.urdf}; give --robot of the arm it was found on"
         )
@@ -140,9 +140,9 @@ def _rms(content: Mapping[str, Any], joints: Sequence[str]) -> Array:
     for j, joint in enumerate(joints):
         # A joint at rest has no error in a run.
         each = [run[joint]["rms_unfiltered"] for run in runs if run.get(joint)]
-        told = [float(rms) for rms in each if rms is not None]
-        if told:
-            found[j] = float(np.sqrt(np.mean(np.square(told))))
+        entries = [float(rms) for rms in each if rms is not None]
+        if entries:
+            found[j] = float(np.sqrt(np.mean(np.square(entries))))
     return found
 
 

@@ -64,16 +64,16 @@ def robot_files(found: IdentifiedModel) -> tuple[dict[str, str], tuple[str, ...]
     except EstimationError as error:
         return {}, (f"no URDF and no MJCF is written: {error}",)
     files: dict[str, str] = {}
-    told = [*notes]
+    all_notes = [*notes]
     for to in ("urdf", "mjcf"):
         try:
             name, text, more = _model_file(replace(found, standard=standard), to)
         except ScaraIdentError as error:
-            told.append(f"no {to.upper()} is written: {error}")
+            all_notes.append(f"no {to.upper()} is written: {error}")
         else:
             files[name] = text
-            told += more
-    return files, tuple(dict.fromkeys(told))
+            all_notes += more
+    return files, tuple(dict.fromkeys(all_notes))
 
 
 def _export(found: Identification | Diagnosis, to: str, path: Path) -> tuple[str, ...]:

@@ -32,7 +32,7 @@ _ARMATURE_COMMENT = re.compile(rb"\s*armature [^ ]+ kg( m\^2)? at the joint\s*")
 
 
 def urdf_text(
-    robot: Robot, standard: Array, friction: JointFriction | None = None, *, rotors_told: bool = False
+    robot: Robot, standard: Array, friction: JointFriction | None = None, *, rotors_reported: bool = False
 ) -> tuple[str, tuple[str, ...]]:
     """Write the identified arm as a URDF.
 
@@ -47,7 +47,7 @@ def urdf_text(
         Standard parameters, see `Robot.standard_parameters`.
     friction : JointFriction, optional
         Without it, and where it has NaN, ``<dynamics>`` stays as it is.
-    rotors_told : bool, optional
+    rotors_reported : bool, optional
         Whether a file beside it tells the rotors' inertias, so that their want of a place needs no note.
 
     Returns
@@ -73,7 +73,7 @@ def urdf_text(
     for part in (
         _inertials(robot, bodies, links, content),
         _dynamics(robot, friction, root, content),
-        _rotors(robot, armature, root, content, rotors_told),
+        _rotors(robot, armature, root, content, rotors_reported),
     ):
         for item in part:
             if isinstance(item, Edit):
@@ -174,7 +174,7 @@ def _joint(root: Element, name: str) -> Element:
     return next(element for element in root.find_all("joint") if element.attributes.get("name") == name)
 
 
-def _rotors(robot: Robot, armature: Array, root: Element, content: bytes, told: bool) -> Iterator[Edit | str]:
+def _rotors(robot: Robot, armature: Array, root: Element, content: bytes, reported: bool) -> Iterator[Edit | str]:
     """Set the rotors' inertias where the file has them; say so in a comment where it has no place for them."""
     homeless: list[str] = []
     for j, name in enumerate(robot.joints):
@@ -203,7 +203,7 @@ def _rotors(robot: Robot, armature: Array, root: Element, content: bytes, told: 
             if armature[j] > 0.0:
                 # The comment has every digit.
                 homeless.append(f"{name}: {inertia:.4g}")
-    if homeless and not told:
+    if homeless and not reported:
         yield (
             "a URDF has no place for rotor inertias, so a comment at the joint has the armature; to load them "
             f"again give rotor_inertia in robot.yaml ({', '.join(homeless)})"

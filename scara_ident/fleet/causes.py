@@ -20,14 +20,14 @@ from scara_ident.model.terms.friction import Friction, Offset
 # rest of friction the preload: they need not differ together, and what they share is estimated.
 RUN_KINDS = ("coulomb", "speed", "torque_scale", "offset", "delay")
 # What these make of friction as a whole and of torque scale, as a table has them beside each other.
-TOLD_RUNS = np.array([[1, 0, 0, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]], dtype=float)
+REPORTED_RUN_KINDS = np.array([[1, 0, 0, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]], dtype=float)
 # Friction of these powers of speed is also looked at alone; of higher ones a recording says little.
 ALONE = 2
 # What is left of a change of masses beside a body on the last link, as a share of it, up to which it is that body: no model is exact.
 # A mass of which as much is told by no row is not told.
-LEFT_OF_PAYLOAD, UNTOLD = 0.1, 1e-6
+LEFT_OF_PAYLOAD, UNDETERMINED = 0.1, 1e-6
 # A parameter below so many standard deviations is no size that a share can be taken of.
-TOLD_STDS = 5.0
+SIGNIFICANT_STDS = 5.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,10 +107,10 @@ def causes_of(
             alone = kinds[k] == "offset" or power < ALONE
             power += kinds[k] == "friction"
             if alone:
-                told = kinds[k] == "friction" and abs(value[k]) > TOLD_STDS * std[k]
+                determined = kinds[k] == "friction" and abs(value[k]) > SIGNIFICANT_STDS * std[k]
                 unit = np.zeros((total, 1))
-                unit[k] = value[k] if told else 1.0
-                cause(str(kinds[k]), j, column.meaning, unit, ("1" if told else column.unit,), j)
+                unit[k] = value[k] if determined else 1.0
+                cause(str(kinds[k]), j, column.meaning, unit, ("1" if determined else column.unit,), j)
         if np.any(model.constants[j]) and not np.any(own & (kinds == "offset")):
             cause("offset", j, f"torque offset of {joint}", model.constants[j][:, None], (robot.torque_unit(j),), j)
     place = np.flatnonzero(kinds == "inertia")
@@ -174,8 +174,8 @@ def sizes_in_words(cause: Cause, scene: Scene, size: Array, covariance: Array) -
             name: Parameter(float(x), float(s), unit)
             for name, x, s, unit in zip(names, size, std, cause.units, strict=True)
         }
-    told = cause.candidate.effect.parameters(scene, cause.candidate.member, size, covariance)
-    return {name: item for name, item in told.items() if np.isfinite(item.std) and name != "phase"}
+    determined = cause.candidate.effect.parameters(scene, cause.candidate.member, size, covariance)
+    return {name: item for name, item in determined.items() if np.isfinite(item.std) and name != "phase"}
 
 
 def _payload(scene: Scene, size: Array, covariance: Array) -> Parameter | None:
@@ -183,17 +183,17 @@ def _payload(scene: Scene, size: Array, covariance: Array) -> Parameter | None:
     term, last = scene.model.rigid_body, 10 * tool_of(scene.robot).joint
     columns = term.base.grouping[term.kept, last : last + 10]
     variances, axes = np.linalg.eigh(covariance)
-    told = variances > np.finfo(float).eps * len(variances) * max(float(variances[-1]), 0.0)
-    white = (axes[:, told] / np.sqrt(variances[told])).T
+    determined = variances > np.finfo(float).eps * len(variances) * max(float(variances[-1]), 0.0)
+    white = (axes[:, determined] / np.sqrt(variances[determined])).T
     rows, change = white @ columns, white @ size
     units = np.linalg.norm(rows, axis=0)
     units[units == 0.0] = 1.0
-    inverse = np.linalg.pinv(rows / units, rcond=UNTOLD) / units[:, None]
+    inverse = np.linalg.pinv(rows / units, rcond=UNDETERMINED) / units[:, None]
     mass, left = inverse[0], change - rows @ (inverse @ change)
     # What a mass of 1 kg is taken for, in parts of each of the body's ten parameters.
     taken = (mass @ rows) * units[0] / units
     is_body = np.linalg.norm(left) <= LEFT_OF_PAYLOAD * np.linalg.norm(change)
-    if not is_body or np.linalg.norm(taken - np.eye(len(taken))[0]) > UNTOLD:
+    if not is_body or np.linalg.norm(taken - np.eye(len(taken))[0]) > UNDETERMINED:
         return None
     return Parameter(float(mass @ change), float(np.linalg.norm(mass)), "kg")
 

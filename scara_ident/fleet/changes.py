@@ -302,12 +302,12 @@ class _Search:
         own = [row.directions[k] for row in self.rows]
         aims = np.array([each.T @ rest for each, rest in zip(own, self.left, strict=True)])
         share = np.array([share for _, _, share in self.shapes])
-        inverse, told, kept = _left_of(own, self.basis, share)
+        inverse, information, kept = _left_of(own, self.basis, share)
         if not np.any(kept):
             return None
         wider = np.sqrt(self.scatter.causes.get(cause.label, np.ones(cause.sizes)))
         value = np.einsum("sij,sj->si", inverse, share @ aims)
-        explained = np.where(kept, np.einsum("si,sij,sj->s", value / wider, told, value / wider), -1.0)
+        explained = np.where(kept, np.einsum("si,sij,sj->s", value / wider, information, value / wider), -1.0)
         best = int(np.argmax(explained))
         # Causes are compared as if all were as sure: else the surest scatter, not the best explanation, would come first.
         freedom = self.scatter.freedom

@@ -49,7 +49,7 @@ class ArmReport:
     diagnosis : mapping or None
         Verdict and effects of the latest date of an arm that changed.
     faults : tuple of Fault
-    told : bool
+    determined : bool
         Whether the fleet has dates enough to tell a change from what differs by nature.
     """
 
@@ -58,7 +58,7 @@ class ArmReport:
     changes: tuple[Change, ...] = ()
     diagnosis: Mapping[str, Any] | None = None
     faults: tuple[Fault, ...] = ()
-    told: bool = True
+    determined: bool = True
 
     @property
     def known(self) -> History:
@@ -76,7 +76,7 @@ class ArmReport:
             return "one date"
         if self.changes:
             return "changed"
-        return "unchanged" if self.told else "undecided"
+        return "unchanged" if self.determined else "undecided"
 
     @property
     def sentences(self) -> tuple[str, ...]:
@@ -180,7 +180,7 @@ def watch_fleet(
         if settings.diagnosed:
             work.diagnose({arm: histories[arm].dates[-1] for arm, found in changes.items() if found}, by_arm, engine)
     arms = sorted({*by_arm, *(fault.arm for fault in work.faults)})
-    told = _steps(histories.values()) >= FEWEST_STEPS
+    determined = _steps(histories.values()) >= FEWEST_STEPS
     reports = tuple(
         ArmReport(
             arm,
@@ -188,7 +188,7 @@ def watch_fleet(
             changes.get(arm, ()),
             work.diagnoses.get(arm),
             tuple(sorted((item for item in work.faults if item.arm == arm), key=str)),
-            told,
+            determined,
         )
         for arm in arms
     )

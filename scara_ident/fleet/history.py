@@ -263,8 +263,8 @@ def pseudo_inverses(matrices: Array, share: float) -> Array:
     As NumPy's of Hermitian matrices, without its sorting, which takes as long as small ones do.
     """
     values, vectors = np.linalg.eigh(matrices)
-    told = np.abs(values) > share * np.max(np.abs(values), axis=1, keepdims=True)
-    inverse = np.where(told, 1.0 / np.where(told, values, 1.0), 0.0)
+    determined = np.abs(values) > share * np.max(np.abs(values), axis=1, keepdims=True)
+    inverse = np.where(determined, 1.0 / np.where(determined, values, 1.0), 0.0)
     return np.asarray((vectors * inverse[:, None, :]) @ np.swapaxes(vectors, 1, 2))
 
 

@@ -63,9 +63,9 @@ def joint_scatter(steps: Array, noise: Array) -> Array:
     """
     from scipy.optimize import nnls
 
-    told = np.isfinite(np.einsum("nii->ni", noise))
-    kinds = np.any(told, axis=0)
-    kept = np.all(told[:, kinds], axis=1)
+    determined = np.isfinite(np.einsum("nii->ni", noise))
+    kinds = np.any(determined, axis=0)
+    kept = np.all(determined[:, kinds], axis=1)
     found = np.zeros(PARTS.shape[1])
     if not np.any(kinds) or not np.any(kept):
         return found

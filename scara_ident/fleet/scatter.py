@@ -59,8 +59,8 @@ def fleet_scatter(histories: Sequence[History]) -> Scatter:
     histories : sequence of History
         Of one robot and model.
     """
-    runs, told = run_scatter(histories)
-    freedom = max(1.0, told)
+    runs, freedom_of_runs = run_scatter(histories)
+    freedom = max(1.0, freedom_of_runs)
     found: dict[str, list[Array]] = {}
     parts: dict[str, list[float]] = {}
     for history in histories:

@@ -11,7 +11,7 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.estimation.information import triangular
-from scara_ident.fleet.causes import TOLD_RUNS, Cause, sizes_in_words
+from scara_ident.fleet.causes import REPORTED_RUN_KINDS, Cause, sizes_in_words
 from scara_ident.fleet.changes import Change
 from scara_ident.fleet.history import History, noise_of, pseudo_inverses, scatter
 from scara_ident.fleet.visit import Visit
@@ -155,19 +155,22 @@ def _of_date(
         value = float(visit.value[place]) if np.isfinite(visit.std[place]) else np.nan
         yield Quantity(column.name, column.joint, column.unit, value, float(visit.std[place]), label)
     for cause, size, cover in effects:
-        told = bool(np.all(np.isfinite(size)))
-        if told:
+        determined = bool(np.all(np.isfinite(size)))
+        if determined:
             cover = cover + np.diag(wider.get(cause.label, np.zeros(len(size))))
         each = sizes_in_words(
-            cause, history.scene, size if told else np.zeros(cause.sizes), cover if told else np.eye(cause.sizes)
+            cause,
+            history.scene,
+            size if determined else np.zeros(cause.sizes),
+            cover if determined else np.eye(cause.sizes),
         )
         for name, item in each.items():
-            own = (item.value, item.std) if told else (np.nan, np.inf)
+            own = (item.value, item.std) if determined else (np.nan, np.inf)
             yield Quantity(f"{name}: {cause.label}", cause.joint, item.unit, *own, cause.label)
-    sizes, covers = (part[k] for part in history.run_sizes(TOLD_RUNS))
+    sizes, covers = (part[k] for part in history.run_sizes(REPORTED_RUN_KINDS))
     for j, joint in enumerate(model.robot.joints):
         for kind, words in enumerate((f"friction of {joint}", f"torque scale of {joint}")):
-            place = TOLD_RUNS.shape[1] * j + kind
+            place = REPORTED_RUN_KINDS.shape[1] * j + kind
             if words in labels and np.isfinite(covers[place, place]):
                 std = float(np.sqrt(covers[place, place]))
                 yield Quantity(words, joint, "1", 1.0 + float(sizes[place]), std, labels[words])

@@ -148,8 +148,8 @@ def look(
             visit = _visit(equation, recordings, reference)
         except (ScaraIdentError, ArithmeticError, ValueError, IndexError, np.linalg.LinAlgError) as error:
             why = error if isinstance(error, ScaraIdentError) else f"{type(error).__name__}: {error}"
-            told = f"{files[0].arm}, {files[0].date}: {' '.join(str(why).split())}"
-            return None, (*faults, Fault(files[0].arm, files[0].date, None, told))
+            words = f"{files[0].arm}, {files[0].date}: {' '.join(str(why).split())}"
+            return None, (*faults, Fault(files[0].arm, files[0].date, None, words))
         return replace(visit, faults=tuple(faults)), ()
 
 

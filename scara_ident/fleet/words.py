@@ -46,7 +46,7 @@ def _sentence(changes: Sequence[Change], scene: Scene) -> str:
 def _size(change: Change, cause: Cause, scene: Scene, *, again: bool = False) -> str:
     """Return the size of a change in words; a single one that is named before needs no name again."""
     sizes = sizes_in_words(cause, scene, change.size, change.covariance)
-    told = {key: item for key, item in sizes.items() if abs(item.value) > NAMED_STDS * item.std} or sizes
+    significant = {key: item for key, item in sizes.items() if abs(item.value) > NAMED_STDS * item.std} or sizes
     if cause.effect == "inertia":
         mass = sizes.get("mass")
         if mass is None or abs(mass.value) <= NAMED_STDS * mass.std:
@@ -55,7 +55,9 @@ def _size(change: Change, cause: Cause, scene: Scene, *, again: bool = False) ->
         return f" {abs(mass.value):.3g} kg (± {mass.std:.1g}) {'heavier' if mass.value > 0.0 else 'lighter'}"
     shared = cause.candidate is None
     bare = shared or (again and len(sizes) == 1)
-    return ",".join(_amount("" if bare else f" {key.replace('_', ' ')}", item, shared) for key, item in told.items())
+    return ",".join(
+        _amount("" if bare else f" {key.replace('_', ' ')}", item, shared) for key, item in significant.items()
+    )
 
 
 def day(iso: str) -> str:

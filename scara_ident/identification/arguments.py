@@ -8,7 +8,7 @@ from typing import TypeAlias
 
 from scara_ident.errors import ArgumentError, RecordingError
 from scara_ident.model.model import TorqueModel, build_model
-from scara_ident.recording.recording import Recording, read_recordings, told_apart
+from scara_ident.recording.recording import Recording, distinctly_named, read_recordings
 from scara_ident.recording.tables import check_robot
 from scara_ident.robot.robot import Robot
 
@@ -51,7 +51,7 @@ def recordings_of(recordings: Recordings, robot: Robot, what: str = "recordings"
                 f"{recording.path or recording.name}: a recording of {', '.join(recording.joints)}; the robot's joints are "
                 f"{', '.join(robot.joints)}: read it with this robot"
             )
-    return told_apart(found)
+    return distinctly_named(found)
 
 
 def model_of(model: str | TorqueModel, robot: Robot) -> TorqueModel:

@@ -81,15 +81,15 @@ def _rate(joints: Sequence[_Sums], factor: Array, weight: Array, blocks: int) ->
     # What parameters and one delay for each recording explain is none of the drift's: the model's columns are projected out
     # by the triangular factor that is known, the delays by their few products.
     root = orthonormal(factor)
-    shared, told = (
+    shared, of_others = (
         np.sum([root[joint.rows.columns].T @ getattr(joint, name) for joint in joints], axis=0)
         for name in ("of_lags", "of_others")
     )
     products = np.diag(np.sum([joint.squares for joint in joints], axis=0)) - shared.T @ shared
     late = np.linalg.pinv(products, rcond=1e-9, hermitian=True) @ (
-        np.sum([joint.scores for joint in joints], axis=0) - shared.T @ told
+        np.sum([joint.scores for joint in joints], axis=0) - shared.T @ of_others
     )
-    known = root @ (told - shared @ late)
+    known = root @ (of_others - shared @ late)
     score, information, square = np.zeros(blocks), np.zeros(blocks), 0.0
     for joint, size in zip(joints, weight, strict=True):
         delayed = np.repeat(late, np.diff(joint.bounds), axis=0).T * joint.lag

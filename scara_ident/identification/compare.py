@@ -59,7 +59,7 @@ class TrajectorySummary:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Comparison(Saved, told_by="comparison"):
+class Comparison(Saved, reported_by="comparison"):
     """Every trajectory's parameters against every trajectory.
 
     Attributes

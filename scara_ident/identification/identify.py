@@ -46,7 +46,7 @@ _LOG = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Identification(Saved, told_by="identification"):
+class Identification(Saved, reported_by="identification"):
     """Everything that one identification found.
 
     Attributes
@@ -350,7 +350,7 @@ def undetermined(identification: Identification) -> list[str]:
     return [name for name, open_ in zip(estimate.model.names, estimate.undetermined, strict=True) if open_]
 
 
-def not_told_from_zero(identification: Identification) -> list[str]:
+def insignificant_parameters(identification: Identification) -> list[str]:
     """Return the names of the determined parameters that are within two standard deviations, where known, of zero."""
     estimate = identification.estimate
     small = (np.abs(estimate.value) < 2.0 * estimate.std) & ~estimate.undetermined & np.isfinite(estimate.std)

@@ -181,13 +181,13 @@ def check_rows(observations: Observations) -> None:
     RecordingError
     """
     rows = sum(joint.table.shape[1] for joint in observations.joints)
-    told = np.zeros(observations.parameters, dtype=bool)
+    moved = np.zeros(observations.parameters, dtype=bool)
     for joint in observations.joints:
-        told[joint.columns[np.any(joint.table[:-1] != 0.0, axis=1)]] = True
-    if rows <= np.count_nonzero(told):
+        moved[joint.columns[np.any(joint.table[:-1] != 0.0, axis=1)]] = True
+    if rows <= np.count_nonzero(moved):
         first, unit = observations.data.sources[0], observations.model.robot.position_unit
         raise RecordingError(
-            f"{first.path or first.name}: {rows} independent rows within the bands for {np.count_nonzero(told)} parameters; "
+            f"{first.path or first.name}: {rows} independent rows within the bands for {np.count_nonzero(moved)} parameters; "
             f"{coarse_positions(observations.data.recordings[0], unit) or 'record longer, or give a wider band'}"
         )
 

@@ -146,11 +146,11 @@ def _recordings(diagnosis: Diagnosis) -> Iterator[NextStep]:
 
 def _confirmations(diagnosis: Diagnosis) -> Iterator[NextStep]:
     """Ask for the experiment that brings an effect out, one for all of its joints."""
-    told = {effect.effect for effect in diagnosis.effects if any(item.value for item in effect.confounded_with)}
+    confounded = {effect.effect for effect in diagnosis.effects if any(item.value for item in effect.confounded_with)}
     confirm: dict[str, list[str]] = {}
     experiment = {item.decision.candidate.effect.name: item.decision for item in diagnosis.search.steps}
     for effect in diagnosis.effects:
-        if effect.effect not in told:
+        if effect.effect not in confounded:
             confirm.setdefault(effect.effect, []).append(effect.label)
     for name, labels in confirm.items():
         yield NextStep(f"to confirm {' and '.join(labels)}", experiment[name].candidate.effect.experiment)

@@ -158,8 +158,10 @@ def meaning(name: str, joints: Sequence[str] = ()) -> Meaning:
     quantity = signals[-1] if signals else found[-1] if found else None
     # Of a path, or a structure, the last name says what it is: the clock of a group of positions is no position.
     *above, own = _LEVEL.split(_without_accents(name))
-    told = {_WORDS[part] for token in _TOKEN.finditer(own) for part in _parts(token[0].lower()) if part in _WORDS}
-    if any(above) and told == {"time"}:
+    known_words = {
+        _WORDS[part] for token in _TOKEN.finditer(own) for part in _parts(token[0].lower()) if part in _WORDS
+    }
+    if any(above) and known_words == {"time"}:
         quantity = "time"
     # A unit such as U/min is no minimum.
     outside = {token[0].lower() for token in _TOKEN.finditer(_BRACKETS.sub("", name))}

@@ -42,21 +42,21 @@ def scale_note(recording: Recording, robot: Robot) -> str | None:
         scales = _scales(recording, robot)
     except ScaraIdentError:
         return None
-    told = {j: scale for j, scale in scales.items() if not 1.0 / USUAL < scale < USUAL}
-    if not told:
+    unusual = {j: scale for j, scale in scales.items() if not 1.0 / USUAL < scale < USUAL}
+    if not unusual:
         return None
     sizes = {j: abs(scale) for j, scale in scales.items()}
     near = [robot.joints[j] for j, size in sizes.items() if 1.0 / USUAL < size < USUAL]
     asked = "is effort_gain to be stated" + (
-        ", negative where the sign is opposite" if min(told.values()) < 0.0 else ""
+        ", negative where the sign is opposite" if min(unusual.values()) < 0.0 else ""
     )
     beside = ""
-    if near and any(not 1.0 / USUAL < sizes[j] < USUAL for j in told):
+    if near and any(not 1.0 / USUAL < sizes[j] < USUAL for j in unusual):
         # A URDF is often right of the large links and has the small ones roughly.
         beside, asked = f", and near 1 on {', '.join(near)}", f"{asked}, or are the masses there others"
     if min(sizes.values()) > LIKE_A_GEAR:
         asked += ", or is it measured in front of a gear (effort_side: motor, reduction)"
-    said = ", ".join(f"{scale:.2g} {robot.torque_unit(j)} on {robot.joints[j]}" for j, scale in told.items())
+    said = ", ".join(f"{scale:.2g} {robot.torque_unit(j)} on {robot.joints[j]}" for j, scale in unusual.items())
     return f"effort: by the URDF's masses, a recorded unit is roughly {said}{beside}: {asked}?"
 
 

@@ -98,14 +98,14 @@ def _too_coarse(found: Sequence[tuple[str, float, float | None, float, str]], *,
         return ""
     joints, (_, step, band, way, unit) = ", ".join(name for name, *_ in found), found[0]
     within = "without a low-pass" if band is None else f"in a band of {band:.3g} Hz"
-    told = f"{within} rest and motion cannot be told apart"
+    indistinct = f"{within} rest and motion cannot be told apart"
     if little:
         return (
-            f"positions of {joints} move by {way:.2g} {unit} in all, in steps of {step:.2g} {unit}, so little that {told}; "
+            f"positions of {joints} move by {way:.2g} {unit} in all, in steps of {step:.2g} {unit}, so little that {indistinct}; "
             "move further and faster, or give a narrower band"
         )
     return (
-        f"positions of {joints} go in steps of {step:.2g} {unit}, so coarse that {told}; record with a finer encoder, "
+        f"positions of {joints} go in steps of {step:.2g} {unit}, so coarse that {indistinct}; record with a finer encoder, "
         "faster motion, or give a narrower band"
     )
 

@@ -75,10 +75,10 @@ class VelocityAudit:
     def verdict(self, rate: float) -> str | None:
         """Return `fault` in words."""
         fault = self.fault(rate)
-        return None if fault is None else told_together([fault])
+        return None if fault is None else faults_in_words([fault])
 
 
-def told_together(faults: Sequence[VelocityFault], moving: int = 0) -> str:
+def faults_in_words(faults: Sequence[VelocityFault], moving: int = 0) -> str:
     """Return the words of the same fault on several joints or recordings, with the range of its size.
 
     Parameters
@@ -121,7 +121,7 @@ def velocity_remarks(audited: Sequence[tuple[str, float, Sequence[VelocityAudit]
     return [
         (
             names,
-            f"recorded velocity of {', '.join(joints)} is not used: {told_together(sizes, len(joints) if every else 0)}",
+            f"recorded velocity of {', '.join(joints)} is not used: {faults_in_words(sizes, len(joints) if every else 0)}",
         )
         for (joints, _, every), (names, sizes) in found.items()
     ]

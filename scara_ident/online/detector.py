@@ -20,7 +20,7 @@ from scara_ident.arrays import Array
 STATES = 160
 WIDENING = 1.3
 # Directions of the causes that a block does not tell from the others, as a share of the strongest.
-TOLD = 1e-6
+DETERMINED = 1e-6
 
 
 @dataclass(frozen=True)
@@ -102,8 +102,8 @@ def white_scores(scores: Array, information: Array) -> Array:
     """
     size = np.sqrt(np.maximum(np.diag(information), np.finfo(float).tiny))
     values, vectors = np.linalg.eigh(information / np.outer(size, size))
-    told = values > TOLD * max(float(values[-1]), np.finfo(float).tiny)
-    root = np.where(told, 1.0 / np.sqrt(np.where(told, values, 1.0)), 0.0)
+    determined = values > DETERMINED * max(float(values[-1]), np.finfo(float).tiny)
+    root = np.where(determined, 1.0 / np.sqrt(np.where(determined, values, 1.0)), 0.0)
     # The symmetric root keeps each score near its own cause from block to block.
     return np.asarray(vectors @ (root * (vectors.T @ (scores / size))))
 

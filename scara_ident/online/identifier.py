@@ -89,7 +89,7 @@ class OnlineIdentifier:
         shape = (int(self.settings.block), 4) if self._filter is None else (self._filter.window, 2)
         self._buffer = np.zeros((*shape, joints))
         self._position_noise = PositionNoise.none(joints)
-        self._filled = self._samples = self._seen = self._lost = self._told = 0
+        self._filled = self._samples = self._seen = self._lost = self._logged = 0
 
     def update(self, q: ArrayLike, v: ArrayLike | None, a: ArrayLike | None, effort: ArrayLike) -> Alarm | None:
         """Take in one sample.
@@ -134,8 +134,8 @@ class OnlineIdentifier:
         given = [signal for _, signal in self._given(q, v, a, effort)]
         shapes = {np.shape(signal) for signal in given}
         if len(shapes) > 1 or len(shape := next(iter(shapes))) != 2 or shape[0] != self.model.robot.n:
-            told = ", ".join(map(str, sorted(shapes)))
-            raise UsageError(f"online: signals of shapes {told}; expected ({self.model.robot.n}, N) of each")
+            shapes_given = ", ".join(map(str, sorted(shapes)))
+            raise UsageError(f"online: signals of shapes {shapes_given}; expected ({self.model.robot.n}, N) of each")
         return self._take(np.array(given, dtype=float).transpose(2, 0, 1))
 
     def gap(self) -> None:
@@ -206,7 +206,7 @@ class OnlineIdentifier:
             "information": self._averages.information,
             "torque_noise": np.array([self._noise.squares, self._noise.counted]),
             "position_noise": np.array(astuple(self._position_noise)),
-            "counts": np.array([self._filled, self._samples, self._seen, self._lost, self._told]),
+            "counts": np.array([self._filled, self._samples, self._seen, self._lost, self._logged]),
             "buffer": self._buffer[: self._filled],
             "noise": np.asarray(self.noise, dtype=float),
             "settings": np.array(json.dumps(asdict(self.settings))),
@@ -241,7 +241,7 @@ class OnlineIdentifier:
         found._memory = Memory(state["factor"])
         found._averages = Averages(state["vector"], state["scores"], state["information"])
         found._noise, found._position_noise = noise
-        found._filled, found._samples, found._seen, found._lost, found._told = (int(x) for x in state["counts"])
+        found._filled, found._samples, found._seen, found._lost, found._logged = (int(x) for x in state["counts"])
         found._buffer[: found._filled] = state["buffer"]
         return found
 
@@ -380,8 +380,8 @@ class OnlineIdentifier:
             counts = np.where(self._noise.counted >= 2.0 * GIVEN_ROWS, moving, 0)
             inertia = inertia_at(self.model, value, self._buffer[len(self._buffer) // 2, 0])
             self._position_noise = self._position_noise.after_rows(inertia, self._weight, counts, self._filter)
-            if not self._told and self.notes:
-                self._told = 1
+            if not self._logged and self.notes:
+                self._logged = 1
                 log_notes(_LOG, self.notes)
         share = self.settings.share
         self._averages = self._averages.after(products[1:, 0] / np.sqrt(scale), products[1:, 1:], share)

@@ -91,7 +91,7 @@ class Memory:
             return self
         # In directions in which old information is 1, new information is the square of these singular values.
         new = triangular(rows[:, :-1])
-        told = self.solved(new).T
-        _, singular, right = np.linalg.svd(told, full_matrices=False)
+        solution = self.solved(new).T
+        _, singular, right = np.linalg.svd(solution, full_matrices=False)
         kept = np.sqrt(np.maximum(share, 1.0 - np.minimum(singular**2, 1.0)))
         return Memory(triangular(self.factor - ((1.0 - kept)[:, None] * right).T @ (right @ self.factor)))

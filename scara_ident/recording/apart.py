@@ -13,7 +13,7 @@ from typing import TypeAlias, TypeVar
 from scara_ident.errors import ProcessEnded, RecordingError
 from scara_ident.processes import each_beside
 from scara_ident.recording.paths import recording_paths
-from scara_ident.recording.recording import Recording, read_recording, told_apart
+from scara_ident.recording.recording import Recording, distinctly_named, read_recording
 from scara_ident.robot.robot import Robot
 
 T = TypeVar("T")
@@ -77,7 +77,7 @@ def _usable(each: Sequence[Callable[[], Recording]]) -> Usable:
             notes.append(f"{error}; left out")
     if errors and not found:
         raise errors[0]
-    return told_apart(found), notes
+    return distinctly_named(found), notes
 
 
 @contextmanager
@@ -96,5 +96,5 @@ def _each_apart(read: Callable[[Path], T], paths: Sequence[Path]) -> Iterator[Ca
     if "polars" in sys.modules:
         yield lambda: [cache(partial(read, path)) for path in paths]
         return
-    with each_beside(read, paths) as told:
-        yield lambda: [partial(or_crash, path, found) for path, found in zip(paths, told(), strict=True)]
+    with each_beside(read, paths) as results:
+        yield lambda: [partial(or_crash, path, found) for path, found in zip(paths, results(), strict=True)]

@@ -50,10 +50,10 @@ def distinct_names(paths: Sequence[Path]) -> tuple[str, ...]:
     alike: dict[str, list[tuple[str, ...]]] = {}
     for name in named:
         alike.setdefault(name[-1], []).append(name)
-    return tuple("/".join(name[-_told_by(name, alike[name[-1]]) :]) for name in named)
+    return tuple("/".join(name[-_distinct_words(name, alike[name[-1]]) :]) for name in named)
 
 
-def _told_by(name: tuple[str, ...], alike: Sequence[tuple[str, ...]]) -> int:
+def _distinct_words(name: tuple[str, ...], alike: Sequence[tuple[str, ...]]) -> int:
     """Return how many of the last words of a name no other of these ends in."""
     others = [other for other in alike if other != name]
     count = 1

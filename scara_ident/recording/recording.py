@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Recording(Reported, told_by="recording"):
+class Recording(Reported, reported_by="recording"):
     """One run of one trajectory.
 
     Attributes
@@ -344,7 +344,7 @@ def read_recordings(words: Sequence[Path | str], robot: Robot, *, need_effort: b
     Returns
     -------
     tuple of Recording
-        In order of appearance, each file once; see `told_apart`.
+        In order of appearance, each file once; see `distinctly_named`.
 
     Raises
     ------
@@ -362,10 +362,10 @@ def read_recordings(words: Sequence[Path | str], robot: Robot, *, need_effort: b
     >>> read_recordings(["OJK_*.parquet"], robot)
     (Recording(OJK_1: 2 joints, 5001 samples at 250 Hz),)
     """
-    return told_apart([read_recording(path, robot, need_effort=need_effort) for path in recording_paths(words)])
+    return distinctly_named([read_recording(path, robot, need_effort=need_effort) for path in recording_paths(words)])
 
 
-def told_apart(recordings: Sequence[Recording]) -> tuple[Recording, ...]:
+def distinctly_named(recordings: Sequence[Recording]) -> tuple[Recording, ...]:
     """Return recordings of which those of one name, out of several folders, are named with their folder: results are by name."""
     called = Counter(recording.name for recording in recordings)
     of_files = {recording.path for recording in recordings if recording.path is not None and called[recording.name] > 1}

@@ -21,7 +21,7 @@ from scara_ident.inquiry.next_steps import next_steps
 from scara_ident.inquiry.questions import suspects_in_model
 from scara_ident.inquiry.torque_noise import noise_density
 from scara_ident.model.urdf_values import urdf_values
-from scara_ident.report.diagnosis_words import told
+from scara_ident.report.diagnosis_words import headline_and_details
 from scara_ident.report.identification import bias_of
 from scara_ident.report.left_out import left_out_share
 
@@ -37,7 +37,7 @@ def diagnosis_dict(diagnosis: Diagnosis, worth: Mapping[str, Any] | None = None)
     robot = diagnosis.robot
     nominal = urdf_values(diagnosis.after.model)
     suspects = {item.candidate: item for item in suspects_in_model(diagnosis)}
-    first, others = told(diagnosis)
+    first, others = headline_and_details(diagnosis)
     return {
         "robot": robot.name,
         "model": diagnosis.before.model.name,
@@ -60,7 +60,7 @@ def diagnosis_dict(diagnosis: Diagnosis, worth: Mapping[str, Any] | None = None)
                 "description": effect.description,
                 "parameters": {name: parameter.entry() for name, parameter in effect.parameters.items()},
                 "intervals": intervals(effect, diagnosis),
-                "size_told": effect.size_told,
+                "size_determined": effect.size_determined,
                 "direct": {name: parameter.entry() for name, parameter in effect.direct.items()},
                 "confounded_with": list(dict.fromkeys(confounder.effect for confounder in effect.confounded_with)),
                 "confounders": [
@@ -206,7 +206,7 @@ def _rotor(rotor: RotorInertia, diagnosis: Diagnosis) -> dict[str, Any]:
         "unit": _armature_unit(rotor, diagnosis),
         "nominal": rotor.nominal,
         "stated": rotor.stated,
-        "told": rotor.told,
+        "determined": rotor.determined,
     }
 
 

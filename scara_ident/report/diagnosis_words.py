@@ -14,7 +14,7 @@ from scara_ident.diagnosis.found_effect import FoundEffect
 from scara_ident.diagnosis.held_out.gain import shown_of, words_of
 from scara_ident.effects import Parameter
 from scara_ident.estimation.run_offsets import rms_of
-from scara_ident.estimation.urdf_weight import told_scale
+from scara_ident.estimation.urdf_weight import scale_in_words
 from scara_ident.inquiry.next_steps import next_steps
 from scara_ident.model.terms.friction import Friction
 from scara_ident.report.doubts import doubts
@@ -31,14 +31,14 @@ WORSE = 1.2
 
 def sentences(diagnosis: Diagnosis) -> tuple[str, ...]:
     """Return the result in words, what questions it first."""
-    first, others = told(diagnosis)
+    first, others = headline_and_details(diagnosis)
     return (*first, *others)
 
 
-def told(diagnosis: Diagnosis) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def headline_and_details(diagnosis: Diagnosis) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return the sentences that stand before all else, see `scara_ident.report.doubts`, and all others."""
     after, held = diagnosis.after, diagnosis.training_after
-    scale = told_scale(after, held)
+    scale = scale_in_words(after, held)
     first = doubts(after, held, diagnosis.training_before, scale)
     return first, (*_others(diagnosis), *([] if scale in first else [scale]))
 
@@ -196,7 +196,7 @@ def _found(effect: FoundEffect, diagnosis: Diagnosis) -> list[str]:
     values = ", ".join(quantity(name, parameter) for name, parameter in effect.parameters.items())
     said = f"{effect.title}: {effect.description}; {values}"
     doubted = gain is not None and gain.against(criteria)
-    if not effect.size_told and not doubted:
+    if not effect.size_determined and not doubted:
         # As little as p may be, it is more than nothing.
         chance = f"p = {effect.p_value:.1e}" if effect.p_value else "p < 1e-300"
         said += f"; it is there by what it removes ({chance}), but its size is not settled"
@@ -211,18 +211,20 @@ def _found(effect: FoundEffect, diagnosis: Diagnosis) -> list[str]:
     return [f"Found {said}.", f"Not confirmed by the recordings held out: {words}."]
 
 
-def _directly(name: str, told: Parameter, fitted: Parameter) -> str:
+def _directly(name: str, headline_and_details: Parameter, fitted: Parameter) -> str:
     """Say what a channel tells of a parameter by itself, and whether the fit agrees."""
-    same = abs(told.value - fitted.value) <= DIFFERENT_STDS * np.hypot(told.std, fitted.std)
+    same = abs(headline_and_details.value - fitted.value) <= DIFFERENT_STDS * np.hypot(
+        headline_and_details.std, fitted.std
+    )
     agree = "which agrees" if same else "which differs by more than their uncertainty"
-    return f"A channel of its own, without this fit, tells {quantity(name, told)}, {agree}."
+    return f"A channel of its own, without this fit, tells {quantity(name, headline_and_details)}, {agree}."
 
 
 def _of_rotor(rotor: RotorInertia, diagnosis: Diagnosis) -> str:
     """Say which inertia of a rotor that nobody stated the result rests on."""
     unit = diagnosis.robot.armature_unit(diagnosis.robot.joints.index(rotor.joint))
     guess = f"guessed at {rotor.nominal:.2g} {unit} at the joint from the size of its motor"
-    if rotor.told and rotor.factor is not None:
+    if rotor.determined and rotor.factor is not None:
         near = f"{rotor.armature:.3g} ± {rotor.armature * np.log(rotor.factor):.1g} {unit}"
         far = f"{rotor.armature:.2g} {unit} within a factor of {rotor.factor:.2g}"
         found = near if rotor.factor < NEAR else far

@@ -92,12 +92,12 @@ def canvas(title: str, rows: Sequence[Sequence[Figure]], *, min_width: float = M
 
     rows = [row for row in rows if row]
     width = max(min_width, MIN_COLUMN * max((len(row) for row in rows), default=1))
-    told: set[str] = set()
+    named: set[str] = set()
     legends = []
     for row in rows:
         names = _names(row)
-        legends.append(() if told.issuperset(names) else names)
-        told.update(names)
+        legends.append(() if named.issuperset(names) else names)
+        named.update(names)
     heights = [
         max(_height(figure) for figure in row) + LEGEND * bool(names) for row, names in zip(rows, legends, strict=True)
     ]

@@ -18,11 +18,11 @@ from scara_ident.estimation.pushing import BEYOND_CHANCE, pushes
 from scara_ident.estimation.run_variation import MIN_RUNS
 from scara_ident.estimation.saved import estimate_dict
 from scara_ident.estimation.urdf_scale import scale_sentence, urdf_scale
-from scara_ident.estimation.urdf_weight import rotor_sentence, told_scale
+from scara_ident.estimation.urdf_weight import rotor_sentence, scale_in_words
 from scara_ident.export.result import KEY, rebuild_entry
 from scara_ident.identification.identify import (
     Identification,
-    not_told_from_zero,
+    insignificant_parameters,
     of_unknown_std,
     undetermined,
     worst_validation,
@@ -51,7 +51,7 @@ def identification_dict(identification: Identification) -> dict[str, Any]:
     robot = identification.model.robot
     possible = identification.physical_consistency
     nominal = urdf_values(identification.model)
-    first, others = told(identification)
+    first, others = headline_and_details(identification)
     content: dict[str, Any] = {
         "robot": robot.name,
         "model": identification.model.name,
@@ -117,16 +117,16 @@ def _left_out(robot: Robot, item: Observations) -> dict[str, Any]:
 
 def sentences(identification: Identification) -> tuple[str, ...]:
     """Return the result in words: what questions it, then where it generalises worst, and what the data leave open."""
-    first, others = told(identification)
+    first, others = headline_and_details(identification)
     return (*first, *others)
 
 
-def told(identification: Identification) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def headline_and_details(identification: Identification) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return the sentences that stand before the parameters, see `scara_ident.report.doubts`, and all others."""
     held, channels = identification.training, identification.channels
     robot = identification.model.robot
     # Under efforts of opposite sign bodies and gravity are nobody's.
-    scale = scale_sentence(None, robot) if channels else told_scale(identification.estimate, held)
+    scale = scale_sentence(None, robot) if channels else scale_in_words(identification.estimate, held)
     first = doubts(identification.estimate, held, held, scale, channels)
     others = _others(identification)
     if scale not in first:
@@ -169,7 +169,7 @@ def _others(identification: Identification) -> list[str]:
         below = below_zero_said(identification.estimate, identification.training)
         if below is not None:
             found.append(below)
-    small = not_told_from_zero(identification)
+    small = insignificant_parameters(identification)
     if small:
         found.append(f"Within two standard deviations of zero: {listed(small, MAX_NAMED)}.")
     unsure = of_unknown_std(identification)

@@ -12,7 +12,7 @@ from scara_ident.errors import RobotError
 from scara_ident.robot.robot import Robot
 
 # Directions of a force below this share of the best told one are not felt, and an axis is told with this share of it in others.
-UNFELT, TOLD = 1e-3, 0.999
+UNFELT, DETERMINED = 1e-3, 0.999
 
 
 def place_of(robot: Robot, joint_id: int) -> int:
@@ -109,8 +109,8 @@ def force_covariance(rows: Sequence[Array] | Array, products: Array) -> Array:
     matrix = np.concatenate(rows)
     inverse = np.linalg.pinv(matrix, rcond=UNFELT)
     slope = inverse @ np.tile(np.eye(len(products)), (len(rows), 1))
-    untold = np.diag(inverse @ matrix) < TOLD
-    return np.asarray(np.where(untold[:, None] | untold, np.nan, slope @ products @ slope.T))
+    undetermined = np.diag(inverse @ matrix) < DETERMINED
+    return np.asarray(np.where(undetermined[:, None] | undetermined, np.nan, slope @ products @ slope.T))
 
 
 def felt_directions(robot: Robot, configurations: Iterable[Array]) -> int:
@@ -119,7 +119,7 @@ def felt_directions(robot: Robot, configurations: Iterable[Array]) -> int:
     return int(np.sum(singular > UNFELT * singular[0]))
 
 
-def told_at_once(rows: Sequence[Array] | Array, directions: int) -> float:
+def weakest_direction(rows: Sequence[Array] | Array, directions: int) -> float:
     """Return how well single rows (n, 3) of `constant_force` tell the last of so many directions, over the first.
 
     It is small near a singular pose, where that direction is told by how the arm turns meanwhile, and so by how constant the force

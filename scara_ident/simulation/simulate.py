@@ -29,7 +29,7 @@ WHITE = TorqueNoise()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SimulationResult(Reported, told_by="simulation"):
+class SimulationResult(Reported, reported_by="simulation"):
     """A recording and what was behind it.
 
     Attributes

@@ -135,12 +135,12 @@ def read_motion(path: Path | str, known: IdentifiedModel) -> tuple[Motion, ...]:
     )
     wanted = {f"{joint}.{kind}" for joint in robot.joints for kind in ("position", "velocity", "acceleration")}
     if wanted <= names and not any(f"{joint}.effort" in names for joint in robot.joints):
-        told = read_trajectory(path, robot)
-        step = np.diff(told.time)
-        if len(told.time) < 2 or not np.all(step > 0.0):
+        planned = read_trajectory(path, robot)
+        step = np.diff(planned.time)
+        if len(planned.time) < 2 or not np.all(step > 0.0):
             raise RecordingError(f"{path}: time is not strictly increasing; give a trajectory of two samples or more")
-        signals = (told.position, told.velocity, told.acceleration)
-        return (Motion(told.name, told.name, told.time, *signals, None, 1.0 / float(np.median(step))),)
+        signals = (planned.position, planned.velocity, planned.acceleration)
+        return (Motion(planned.name, planned.name, planned.time, *signals, None, 1.0 / float(np.median(step))),)
     recording = read_recording(path, robot, need_effort=False)
     found = []
     for part in prepare([recording], known.bands).stretches:

@@ -39,7 +39,7 @@ class Contact:
         Mean external torque while it is strong, recorded side.
     place : str
         ``tool``, or the outermost link that it may act on, as told by the joints that it loads.
-    told : ContactForce
+    estimate : ContactForce
         What its torque says of the force.
     """
 
@@ -50,22 +50,22 @@ class Contact:
     score: float
     torque: Array
     place: str
-    told: ContactForce
+    estimate: ContactForce
 
     @property
     def force(self) -> Array | None:
         """Constant force on the place that explains it, base frame, N, shape (3,); None where it is not told."""
-        return self.told.force
+        return self.estimate.force
 
     @property
     def force_covariance(self) -> Array | None:
         """Of that force, by the residual without contact, shape (3, 3); NaN along axes that the arm does not tell."""
-        return self.told.covariance
+        return self.estimate.covariance
 
     @property
     def explained(self) -> float:
         """Share of the squared torque that a constant force on the tool explains."""
-        return self.told.explained
+        return self.estimate.explained
 
     @property
     def force_words(self) -> str:
@@ -81,7 +81,7 @@ class Contact:
     @property
     def point_words(self) -> str:
         """Where on its link the force acts beside the tool, m; a dash where that is not told."""
-        point, std = self.told.point, self.told.point_std
+        point, std = self.estimate.point, self.estimate.point_std
         if point is None or std is None:
             return "-"
         return ", ".join(f"{x:.3f} ± {unsure:.1g}" for x, unsure in zip(point, std, strict=True))
@@ -99,8 +99,8 @@ class Contact:
             "place": self.place,
             "force": None if self.force is None else self.force.tolist(),
             "force_std": None if self.force_covariance is None else np.sqrt(np.diag(self.force_covariance)).tolist(),
-            "point": None if self.told.point is None else self.told.point.tolist(),
-            "point_std": None if self.told.point_std is None else self.told.point_std.tolist(),
+            "point": None if self.estimate.point is None else self.estimate.point.tolist(),
+            "point_std": None if self.estimate.point_std is None else self.estimate.point_std.tolist(),
             "explained": self.explained,
         }
 
@@ -125,10 +125,10 @@ def _contact(observer: ContactObserver, observed: Observed, threshold: Array, sh
     mean = np.mean(observed.torque[:, strong], axis=1)
     most = np.abs(mean) / np.mean(threshold[:, strong], axis=1)
     named = [int(j) for j in np.argsort(-most) if most[j] >= min(NAMED, float(np.max(most)))]
-    told = contact_force(observer, observed, threshold, inside, strong)
-    if told.at_tool and len(named) < min(MIN_JOINTS, robot.n):
-        told = ContactForce(told.explained, False)
-    at_last = told.force is not None and not told.at_tool
+    estimate = contact_force(observer, observed, threshold, inside, strong)
+    if estimate.at_tool and len(named) < min(MIN_JOINTS, robot.n):
+        estimate = ContactForce(estimate.explained, False)
+    at_last = estimate.force is not None and not estimate.at_tool
     outermost = place_of(robot, robot.model.njoints - 1) if at_last else _outermost(robot, named)
     return Contact(
         observed.name,
@@ -137,8 +137,8 @@ def _contact(observer: ContactObserver, observed: Observed, threshold: Array, sh
         tuple(robot.joints[j] for j in named),
         float(np.max(size)),
         mean,
-        "tool" if told.at_tool else robot.links[outermost],
-        told,
+        "tool" if estimate.at_tool else robot.links[outermost],
+        estimate,
     )
 
 

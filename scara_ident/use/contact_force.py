@@ -12,8 +12,8 @@ from scara_ident.robot.kinematics import (
     constant_force,
     force_covariance,
     place_of,
-    told_at_once,
     tool_placement,
+    weakest_direction,
 )
 from scara_ident.use.contact_samples import ContactSamples, contact_samples
 from scara_ident.use.external_torque import Observed
@@ -87,17 +87,17 @@ def contact_force(
     fitted = contact_samples(observer, observed, threshold, inside, strong)
     at_tool = fitted.rows[..., 0]
     force, explained = constant_force(at_tool, fitted.torques)
-    told = told_at_once(at_tool, observer.felt) >= MIN_DIRECTION_RATIO
+    determined = weakest_direction(at_tool, observer.felt) >= MIN_DIRECTION_RATIO
     left = fitted.torques - at_tool @ force
     unsure = _unsure(fitted, left)
     beside = None
-    if robot.n >= JOINTS_FOR_POINT and told:
+    if robot.n >= JOINTS_FOR_POINT and determined:
         # What a force elsewhere explains is no change of the force meanwhile.
         beside = _beside_tool(fitted, fitted.scatter, force)
         unsure = _unsure(fitted, beside.left)
         beside = _beside_tool(fitted, unsure, beside.force, beside.point)
     if explained >= FITS and _leaves_noise(np.mean(at_tool, axis=0), np.mean(fitted.torques, axis=0), unsure):
-        if not told:
+        if not determined:
             return ContactForce(explained, True)
         if beside is None:
             covariance = force_covariance(at_tool, fitted.scatter + left.T @ left / len(left))

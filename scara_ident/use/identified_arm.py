@@ -135,8 +135,8 @@ def _nearest(arm: VirtualArm, body: RigidBody, base: Array, near: Array | None) 
         standard[negative], free[negative] = 0.0, False
     share = grouping[:, rotors]
     left = share.T @ (base - grouping @ standard) / np.maximum(np.sum(share**2, axis=0), np.finfo(float).tiny)
-    told = ~free[rotors] & (left < -_ROUNDING * size[rotors])
-    return standard, np.where(told, left, 0.0)
+    determined = ~free[rotors] & (left < -_ROUNDING * size[rotors])
+    return standard, np.where(determined, left, 0.0)
 
 
 def simulated(found: Sequence[Entry]) -> tuple[tuple[tuple[Effect, Entry], ...], tuple[str, ...]]:

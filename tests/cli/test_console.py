@@ -13,7 +13,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from scara_ident.cli.console import output_console, progress, table
-from scara_ident.report.told.words import number
+from scara_ident.report.summaries.words import number
 from tests.made_recordings import columns, save
 from tests.shared import PATIENCE
 

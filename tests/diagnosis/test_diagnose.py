@@ -12,7 +12,7 @@ from numpy.testing import assert_array_equal
 from scara_ident.diagnosis import diagnose
 from scara_ident.diagnosis.candidates.candidates import columns_at_hand
 from scara_ident.diagnosis.evidence.outcome import outcome_of
-from scara_ident.diagnosis.selection.told_in import told_in
+from scara_ident.diagnosis.selection.other_bands import in_bands_of
 from scara_ident.effects import CATALOGUE, Coefficient, Effect, effects_named
 from scara_ident.effects.friction import AsymmetricFriction, Stribeck
 from scara_ident.effects.measurement import TimeDelay, shifted
@@ -227,9 +227,9 @@ def test_what_is_told_from_a_lower_band_is_of_one_model_and_what_is_left_is_judg
         step = outcome.search.step
         columns = step.columns.at((8.0, 8.0))
         scene = replace(step.scene, band=8.0, columns=columns_at_hand(columns.observations))
-        return outcome_of(task, told_in(outcome.search, replace(step, scene=scene, columns=columns)))
+        return outcome_of(task, in_bands_of(outcome.search, replace(step, scene=scene, columns=columns)))
 
-    monkeypatch.setattr(module, "told_where_quiet", lower)
+    monkeypatch.setattr(module, "below_position_noise", lower)
     weighed = module.weighed_evidence
 
     def witnessed(outcome, held, *others):

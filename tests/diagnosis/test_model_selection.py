@@ -17,8 +17,8 @@ from scara_ident.diagnosis.model_selection import (
     _asked_band,
     _band_beyond,
     _promised_band,
+    below_position_noise,
     select_model,
-    told_where_quiet,
 )
 from scara_ident.diagnosis.selection.search import SearchTask, search
 from scara_ident.diagnosis.testing.selection_step import SelectionStep, observed
@@ -113,21 +113,21 @@ def test_a_search_is_told_where_it_is_quiet_and_stays_where_it_was_unless_all_st
     monkeypatch.setattr(
         module, "replace", lambda item, **changes: changes if item is searched.step else replace(item, **changes)
     )
-    monkeypatch.setattr(module, "told_in", lambda found, step: (found, step))
+    monkeypatch.setattr(module, "in_bands_of", lambda found, step: (found, step))
     monkeypatch.setattr(module, "outcome_of", lambda _, found: quiet if found == (searched, "below") else None)
     monkeypatch.setattr(module, "_unstable", lambda *_: [])
     monkeypatch.setattr(
         module, "quieter", lambda step: "below" if step == {"weights": "weights", "variation": "offsets"} else None
     )
     task = SimpleNamespace(progress=lambda *_: None)
-    found = told_where_quiet(task, wide)
+    found = below_position_noise(task, wide)
     assert found is not wide and (found.demoted, found.suspected) == (("a",), ("b",))
     left = replace(wide, unexplained="something")
-    assert told_where_quiet(task, left) is left
+    assert below_position_noise(task, left) is left
     for name, made in (("_unstable", lambda *_: ["a"]), ("outcome_of", lambda *_: left), ("quieter", lambda _: None)):
         with monkeypatch.context() as context:
             context.setattr(module, name, made)
-            assert told_where_quiet(task, wide) is wide
+            assert below_position_noise(task, wide) is wide
 
 
 @pytest.mark.slow
@@ -202,7 +202,7 @@ def test_a_band_whose_further_effects_do_not_stand_is_given_up(left: str, told: 
     monkeypatch.setattr(module, "choose_bands", lambda *_: SimpleNamespace(bands=(5.0,)))
     monkeypatch.setattr(module, "_asked_band", lambda item: 50.0 if told or item is wide else 0.0)
     monkeypatch.setattr(module, "_promised_band", lambda item, _: 50.0)
-    monkeypatch.setattr(module, "_told", lambda _: np.inf)
+    monkeypatch.setattr(module, "_corrected_band", lambda _: np.inf)
     monkeypatch.setattr(module, "_band_beyond", lambda *_: 0.0)
     monkeypatch.setattr(module, "_new", lambda *_: True)
     monkeypatch.setattr(module, "observe", lambda *_: None)

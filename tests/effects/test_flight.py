@@ -76,7 +76,7 @@ def test_slopes_are_the_differences_of_the_torque(joint: int):
     step = 5e-3 * width
     differences.append((torque(scene.value, 0.0, width + step) - torque(scene.value, 0.0, width - step)) / (2.0 * step))
     for k, expected in enumerate(differences):
-        if k == bodies and scene.told_armature(joint) is not None:
+        if k == bodies and scene.known_armature(joint) is not None:
             continue
         # Flights end at samples, which a difference moves over one at a time.
         assert np.linalg.norm(found[:, k] - expected) < 0.06 * np.linalg.norm(expected) + 1e-9

@@ -63,8 +63,8 @@ def test_members_are_those_that_can_be_told():
 def test_of_more_than_two_joints_the_first_may_have_the_wrong_scale_too():
     scene, effect = scene_of(ur5()), TorqueGainMismatch()
     assert [member.joint for member in effect.members(scene)] == [0, 1, 2, 3, 4, 5]
-    assert effect.told_beside(scene, Member(0)) is None
-    assert effect.told_beside(scene, Member(4)) == Member(0)
+    assert effect.estimated_beside(scene, Member(0)) is None
+    assert effect.estimated_beside(scene, Member(4)) == Member(0)
     assert effect.description(scene, Member(0)) == "a torque scale of its own, given over that of the joints not named"
     assert effect.description(scene, Member(4)) == "a torque scale of its own, given over the first joint's"
     assert effect.or_else(scene, Member(4), np.array([0.1])) == ""

@@ -52,13 +52,13 @@ def test_of_two_joints_that_share_parameters_the_second_is_tried(tmp_path: Path)
     effect = TorqueGainMismatch()
     scene = scene_of(in_unit(CYLINDRICAL, 1.0, tmp_path))
     assert [member.joint for member in effect.members(scene)] == [2]
-    assert effect.told_beside(scene, Member(2)) == Member(0)
+    assert effect.estimated_beside(scene, Member(2)) == Member(0)
     assert "nothing tells which" in effect.or_else(scene, Member(2), np.array([0.2]))
     assert effect.members(scene_of(in_unit(PLANAR_2R[:1], 1.0, tmp_path))) == ()
     # Behind a slide that is alone the ratio is to the scale of the first that turns.
     scene = scene_of(in_unit((SLIDES[2], TURN, TURN, TURN), 1.0, tmp_path))
     assert [member.joint for member in effect.members(scene)] == [1, 2, 3]
-    assert effect.told_beside(scene, Member(3)) == Member(1) and effect.told_beside(scene, Member(1)) is None
+    assert effect.estimated_beside(scene, Member(3)) == Member(1) and effect.estimated_beside(scene, Member(1)) is None
     assert effect.description(scene, Member(3)) == "a torque scale of its own, given over that of j2"
     assert effect.description(scene, Member(1)) == "a torque scale of its own, given over that of the joints not named"
     assert effect.or_else(scene, Member(3), np.array([0.2])) == ""

@@ -57,11 +57,11 @@ def test_a_torque_swings_by_what_is_beyond_the_low_pass_of_the_positions():
 def test_an_armature_is_what_the_model_tells_else_what_an_effect_told_else_nominal():
     scene = scene_of(load_robot())
     nominal = scene.robot.reduction**2 * scene.robot.rotor_inertia
-    assert scene.told_armature(0) is None
+    assert scene.known_armature(0) is None
     assert scene.armature(0) == pytest.approx(nominal[0])
     assert replace(scene, armatures={0: 0.7, 1: 0.7}).armature(0) == 0.7
-    assert replace(scene, armatures={0: 0.7, 1: 0.7}).armature(1) == scene.told_armature(1)
-    assert scene.told_armature(1) == pytest.approx(nominal[1])
+    assert replace(scene, armatures={0: 0.7, 1: 0.7}).armature(1) == scene.known_armature(1)
+    assert scene.known_armature(1) == pytest.approx(nominal[1])
 
 
 @pytest.mark.parametrize(("arm", "mass"), [("scara03", 0.4), ("scara03", 3.0), ("ur5", 1.0), ("ur5", -0.5)])

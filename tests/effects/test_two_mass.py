@@ -48,7 +48,7 @@ def test_slopes_are_the_differences_of_the_torque_once_the_start_is_forgotten(jo
         expected = (scaled(scene.value + step) - scaled(scene.value - step)) / 2e-3
         assert np.abs(found[:, k] - expected).max() < 0.002 * np.abs(expected).max() + 1e-5 * np.abs(found).max()
     for k, (name, step) in enumerate((("armature", 1e-3), ("frequency", 1e-3), ("ratio", 1e-4))):
-        if name == "armature" and scene.told_armature(joint) is not None:
+        if name == "armature" and scene.known_armature(joint) is not None:
             continue
         at = {"armature": 0.0, "frequency": 4.5, "ratio": 0.1}[name]
         expected = (scaled(scene.value, **{name: at + step}) - scaled(scene.value, **{name: at - step})) / (2.0 * step)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from scara_ident.estimation import Estimate, ols, wls
-from scara_ident.estimation.least_squares import told_value_and_weights
+from scara_ident.estimation.least_squares import determined_value_and_weights
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.estimation.run_offsets import beside_offsets, larger_offsets, offsets_on, rms_beside_own
 from scara_ident.model.model import build_model
@@ -165,7 +165,7 @@ def test_offsets_of_one_band_are_those_of_another(robot: Robot):
     there, own = offsets_on(narrow, offsets), wls(narrow).offsets
     for one, other in zip(there.joints, own.joints, strict=True):
         np.testing.assert_allclose(one.std[2] / one.noise, other.std[2] / other.noise, rtol=0.2)
-    value = [wls(narrow).value, told_value_and_weights(narrow, there)[0]]
+    value = [wls(narrow).value, determined_value_and_weights(narrow, there)[0]]
     assert np.linalg.norm((value[1] - value[0]) / wls(narrow).std) < 0.1
 
 

@@ -18,7 +18,7 @@ from scara_ident.estimation.urdf_scale import (
     unlike_urdf,
     urdf_scale,
 )
-from scara_ident.estimation.urdf_weight import told_scale
+from scara_ident.estimation.urdf_weight import scale_in_words
 from scara_ident.model.model import build_model
 from scara_ident.motion.prepared import prepare
 from scara_ident.recording.recording import Recording
@@ -72,11 +72,11 @@ def test_where_friction_brakes_no_gain_of_opposite_sign_is_suspected(tmp_path):
     observations = observe(model, prepare([braked], (8.0, 8.0)))
     estimate = wls(observations)
     assert friction_sides(estimate, observations).brakes == robot.joints
-    said = told_scale(estimate, observations)
+    said = scale_in_words(estimate, observations)
     assert "the opposite sign of the URDF's on j1, j2, though friction brakes there" in said
     assert "negate" not in said
     pushed = observe(model, prepare([replace(run, effort=-run.effort - 2.0 * np.sign(rate))], (8.0, 8.0)))
-    said = told_scale(wls(pushed), pushed)
+    said = scale_in_words(wls(pushed), pushed)
     assert (
         "on j1, j2, and friction feeds energy in there: efforts or positions count backwards, negate effort_gain"
         in said
@@ -98,7 +98,7 @@ def test_friction_brakes_by_all_of_its_law_together(tmp_path):
     assert np.all(np.abs(estimate.value[coulomb]) < 5.0 * estimate.std[coulomb])
     found = friction_sides(estimate, observations)
     assert found.brakes == ("j2",) and found.pushes == ("j1",)
-    said = told_scale(estimate, observations)
+    said = scale_in_words(estimate, observations)
     assert "on j1, and friction feeds energy in there" in said
     assert "They have it on j2, though friction brakes there" in said
 
@@ -182,7 +182,7 @@ def test_nothing_is_asked_for_a_light_joint_whose_centre_of_mass_is_a_little_off
     seen = wls(observations), observations
     assert urdf_scale(*seen)["j2"] > 2.0
     assert slight_joints(*seen) == ("j2",)
-    said = told_scale(*seen)
+    said = scale_in_words(*seen)
     assert "right?" not in said
     assert said.endswith(
         " times the URDF's on j2, but so small there that a centre of mass a little off makes as much."
@@ -190,7 +190,7 @@ def test_nothing_is_asked_for_a_light_joint_whose_centre_of_mass_is_a_little_off
     # Of a joint that bears much it is asked, and of all alike.
     heavy = observe(build_model(stated, "basic"), prepare([replace(run, effort=100.0 * run.effort)], (8.0, 8.0)))
     assert slight_joints(wls(heavy), heavy) == ()
-    assert "right?" in told_scale(wls(heavy), heavy)
+    assert "right?" in scale_in_words(wls(heavy), heavy)
     alike = scale_sentence({"j1": 100.0, "j2": 110.0}, stated, (), ("j2",))
     assert alike.endswith("All inertial parameters are 1e+02 of the URDF's: is effort_gain right?")
     for alone in (-4.0, 4.0):

@@ -12,7 +12,7 @@ import pytest
 from scara_ident.estimation import wls
 from scara_ident.estimation.estimate import Estimate
 from scara_ident.estimation.observations import Observations, observe
-from scara_ident.estimation.urdf_weight import otherwise_loaded, rotor_sentence, told_scale
+from scara_ident.estimation.urdf_weight import otherwise_loaded, rotor_sentence, scale_in_words
 from scara_ident.model.model import build_model
 from scara_ident.motion.prepared import prepare
 from scara_ident.robot.robot import Robot, load_robot
@@ -56,7 +56,7 @@ def test_a_counterweight_is_no_gain(lift):
     # The offset of 0.1 N is taken for weight.
     assert own.weight == pytest.approx((55.0 - balance) / 55.0, rel=0.01)
     assert own.inertia == pytest.approx((75.0 + balance) / 75.0, rel=0.01)
-    said = told_scale(*found)
+    said = scale_in_words(*found)
     assert "right?" not in said
     assert said.endswith(
         "Weight and inertia of the bodies are 0.36 and 1.5 times the URDF's on j1, which no effort_gain makes: the URDF "
@@ -70,7 +70,7 @@ def test_a_counterweight_is_no_gain(lift):
 
 @pytest.mark.parametrize("balance", [55.0, 70.0])
 def test_one_that_bears_all_or_more_is_named_too(lift, balance):
-    said = told_scale(*seen(lift, (balance * (state(lift)[2][0] - 9.81), 0.0)))
+    said = scale_in_words(*seen(lift, (balance * (state(lift)[2][0] - 9.81), 0.0)))
     assert "counterweight" in said
     assert "right?" not in said
     assert "negate" not in said
@@ -81,8 +81,10 @@ def test_a_wrong_gain_is_asked_for_and_nothing_else_and_of_a_right_arm_nothing(l
     for found in (right, wrong):
         assert otherwise_loaded(*found) == {}
         assert rotor_sentence(*found) is None
-    assert "right?" not in told_scale(*right)
-    assert "All inertial parameters are 0.3 of the URDF's: are effort_gain and effort_side right?" in told_scale(*wrong)
+    assert "right?" not in scale_in_words(*right)
+    assert "All inertial parameters are 0.3 of the URDF's: are effort_gain and effort_side right?" in scale_in_words(
+        *wrong
+    )
 
 
 def test_a_rotor_that_is_not_as_stated_is_said_alone(lift):
@@ -98,7 +100,7 @@ def test_on_a_joint_that_turns_a_centre_of_mass_may_lie_elsewhere(tmp_path):
     robot = load_robot(write_urdf(tmp_path / "arm.urdf", PLANAR_2R))
     q = state(robot)[0]
     weight = rnea(robot, q, np.zeros_like(q), np.zeros_like(q))[0]
-    said = told_scale(*seen(robot, (-0.7 * weight, 0.0)))
+    said = scale_in_words(*seen(robot, (-0.7 * weight, 0.0)))
     assert "times the URDF's on j1, which no effort_gain makes" in said
     assert said.endswith("or a payload, or has a centre of mass elsewhere.")
 

@@ -9,9 +9,9 @@ import pytest
 
 from scara_ident.arrays import Array
 from scara_ident.estimation.information import residual_noise, weighted
-from scara_ident.estimation.least_squares import ols, told_value_and_weights, wls
+from scara_ident.estimation.least_squares import determined_value_and_weights, ols, wls
 from scara_ident.estimation.observations import Observations, observe
-from scara_ident.estimation.working_range import believable, told_directions
+from scara_ident.estimation.working_range import believable, determined_directions
 from scara_ident.model.model import build_model
 from scara_ident.motion.prepared import prepare
 from scara_ident.robot.robot import Robot, load_robot
@@ -46,7 +46,7 @@ def largest_error(value: Array, other: Observations) -> float:
 def test_an_arm_that_moves_leaves_nothing_open(robot: Robot):
     found = observations(robot, 1, (1.0, 1.0))
     plain = weighted(found.by_joint, np.ones(robot.n)).solve()
-    assert told_directions(found, residual_noise(found.by_joint, plain.value)) is None
+    assert determined_directions(found, residual_noise(found.by_joint, plain.value)) is None
     np.testing.assert_array_equal(ols(found).value, plain.value)
     assert not np.any(ols(found).undetermined)
 
@@ -66,7 +66,7 @@ def test_a_joint_that_hardly_moves_does_not_make_absurd_predictions(robot: Robot
 def test_parameters_without_a_covariance_are_those_with_one(robot: Robot):
     for seed, size in ((1, (1.0, 1.0)), (2, (0.2, 2e-4))):
         found = observations(robot, seed, size)
-        value, weights = told_value_and_weights(found)
+        value, weights = determined_value_and_weights(found)
         np.testing.assert_array_equal(value, wls(found).value)
         np.testing.assert_array_equal(weights, wls(found).weights)
 
@@ -74,7 +74,7 @@ def test_parameters_without_a_covariance_are_those_with_one(robot: Robot):
 def test_directions_left_open_are_at_zero(robot: Robot):
     still = observations(robot, 2, (0.2, 2e-4))
     estimate = wls(still)
-    told = told_directions(
+    told = determined_directions(
         still, residual_noise(still.by_joint, weighted(still.by_joint, estimate.weights).solve().value)
     )
     assert told is not None
@@ -91,10 +91,10 @@ def test_directions_left_open_are_at_zero(robot: Robot):
 def test_a_drive_that_is_stated_far_too_weak_is_as_strong_as_it_was_seen(robot: Robot):
     weak = replace(robot, effort_limit=np.full(robot.n, 1e-6), velocity_limit=np.full(robot.n, 1e4))
     found = observations(weak, 1, (1.0, 1.0), model="basic")
-    assert told_directions(found, residual_noise(found.by_joint, wls(found).value)) is None
+    assert determined_directions(found, residual_noise(found.by_joint, wls(found).value)) is None
     unstated = replace(robot, effort_limit=np.full(robot.n, np.inf), velocity_limit=np.full(robot.n, np.inf))
     found = observations(unstated, 1, (1.0, 1.0))
-    assert told_directions(found, residual_noise(found.by_joint, wls(found).value)) is None
+    assert determined_directions(found, residual_noise(found.by_joint, wls(found).value)) is None
 
 
 def test_a_slow_motion_foresees_the_torques_of_a_fast_one(robot: Robot):

@@ -12,7 +12,7 @@ from scara_ident.effects import Member
 from scara_ident.effects.periodic import PERIODS_COVERED, TorqueRipple
 from scara_ident.estimation.information import merge
 from scara_ident.estimation.observations import observe
-from scara_ident.excitation.promise import SURE, rows_in_blocks, told
+from scara_ident.excitation.promise import SURE, expected_answers, rows_in_blocks
 from scara_ident.identification.usable import usable_in_bands
 from scara_ident.inquiry.answerability import inquire, known_rows
 from scara_ident.inquiry.questions import Kind, Question, Suspect, questions
@@ -35,7 +35,7 @@ def test_recordings_at_hand_count_in_the_bands_that_a_further_one_brings():
     assert min(bands) > max(BANDS)
     data, _, _ = usable_in_bands(inquiry.scene.model, small_runs(), (), bands)
     again = known_rows(inquiry, CandidateColumns(observe(inquiry.scene.model, data)))
-    (item,) = told(inquiry, [motion])
+    (item,) = expected_answers(inquiry, [motion])
     assert item.after == pytest.approx(inquiry.sigmas(merge([again, new.information]))[0], rel=1e-6)
     assert item.before == inquiry.sigmas()[0]
 
@@ -45,13 +45,13 @@ def test_of_what_may_be_below_the_limit_that_which_would_not_be_found_is_named()
     first, second = questions(found)[0].suspects
     faint = replace(second, value=tuple(1e-3 * x for x in second.value))
     each = [Question("below_limit", item.label, (item,), experiment="weigh it") for item in (first, faint)]
-    spring, tilt = told(inquire(found, each), [motion])
+    spring, tilt = expected_answers(inquire(found, each), [motion])
     assert spring.settled and spring.unshown == () and spring.instead == ""
     assert not tilt.settled and tilt.unshown == ("base_tilt",)
     assert tilt.instead == "Would not tell: base_tilt. What would: weigh it."
     # Of several, what brings out those that it does not tell.
     both = Question("below_limit", "all", (first, faint), experiment="weigh it")
-    (item,) = told(inquire(found, [both]), [motion])
+    (item,) = expected_answers(inquire(found, [both]), [motion])
     assert item.unshown == ("base_tilt",)
     assert item.instead == f"Would not tell: base_tilt. What would: {faint.candidate.effect.experiment}."
 
@@ -64,7 +64,7 @@ def test_the_least_that_would_be_found_is_as_large_as_needed():
         asked = [Question("below_limit", "spring", (replace(spring, value=value),))]
         # What the model has is asked for at the size that it has there.
         inquiry = inquire(found, asked)
-        (item,) = told(
+        (item,) = expected_answers(
             replace(inquiry, in_model=(), known=known_rows(replace(inquiry, in_model=()), inquiry.columns)), [motion]
         )
         return item, item.shown[0]
@@ -96,7 +96,7 @@ def test_of_what_the_motion_holds_too_few_periods_to_be_tried_is_named(kind: Kin
     per_turn = abs(float(inquiry.scene.robot.reduction[0])) * Slow.orders[0] / (2.0 * np.pi)
     reach = max(float(inquiry.scene.travel[0]), float(np.ptp(small.q[0])))
     assert per_turn * reach < PERIODS_COVERED < per_turn * np.ptp(wide.q[0])
-    (near,), (far,) = told(inquiry, [small]), told(inquiry, [wide])
+    (near,), (far,) = expected_answers(inquiry, [small]), expected_answers(inquiry, [wide])
     assert near.unshown == ("ripple of joint1",) and not near.settled
     assert near.instead == f"Would not tell: ripple of joint1. What would: {Slow.experiment}."
     assert far.unshown == () and far.settled == (kind == "below_limit" or far.after >= SURE)

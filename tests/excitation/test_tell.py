@@ -14,7 +14,7 @@ from scara_ident.effects.tilt import BaseTilt
 from scara_ident.errors import ScaraIdentError, UsageError
 from scara_ident.estimation.observations import observe
 from scara_ident.excitation import Effort, design_excitation, excitation_dict, limits_of
-from scara_ident.excitation.promise import told
+from scara_ident.excitation.promise import expected_answers
 from scara_ident.excitation.tell import slowed
 from scara_ident.identification.usable import usable_in_bands
 from scara_ident.inquiry.answerability import inquire, known_rows
@@ -48,7 +48,7 @@ def test_the_motion_keeps_its_limits_and_is_said_to_tell(asked):
     assert entry["sigma_before"] < 4.0 and entry["sigma_after"] > 10.0
     assert entry["settled"] is True and entry["unshown"] == []
     # More of the same small motion would not.
-    same = told(asked[0], [part.motion for part in open_diagnosis().search.data.stretches[:1]])
+    same = expected_answers(asked[0], [part.motion for part in open_diagnosis().search.data.stretches[:1]])
     assert same[0].after < 2.0 * same[0].before + 0.1
     assert not same[0].settled and same[0].instead.startswith(f"Would not tell: {PAIR}. What would: ")
 
@@ -80,7 +80,7 @@ def test_the_motion_tells_as_much_as_that_of_the_largest_log_determinant_of_what
     inquiry, whole = inquire(found, each), limits_of(model.robot, share=1.0)
     plain = design_excitation(model, duration=6.0, harmonics=6, limits=whole, effort=EFFORT)
     design = design_excitation(model, duration=6.0, harmonics=6, tell=inquiry, limits=whole, effort=EFFORT)
-    of = [[item.after for item in told(inquiry, [own.motion(rate=200.0)])] for own in (design, plain)]
+    of = [[item.after for item in expected_answers(inquiry, [own.motion(rate=200.0)])] for own in (design, plain)]
     assert np.mean(np.log(of[0])) > np.mean(np.log(of[1])) - 0.05
 
 

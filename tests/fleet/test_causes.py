@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scara_ident.fleet.causes import RUN_KINDS, TOLD_RUNS, run_directions, sizes_in_words
+from scara_ident.fleet.causes import REPORTED_RUN_KINDS, RUN_KINDS, run_directions, sizes_in_words
 from tests.fleet.made import DATES, quill_fleet
 
 
@@ -50,7 +50,7 @@ def test_what_differs_from_run_to_run_has_five_directions_on_each_joint(historie
         # Coulomb friction, and all of it that grows with speed.
         assert [np.count_nonzero(weights[:, part]) for part in (0, 1)] == [1, 3]
         friction = next(cause for cause in history.causes if cause.words == f"friction of joint{j + 1}")
-        np.testing.assert_array_equal((weights @ TOLD_RUNS)[:, 0], friction.weights[j][:, 0])
+        np.testing.assert_array_equal((weights @ REPORTED_RUN_KINDS)[:, 0], friction.weights[j][:, 0])
     assert len(history.dates) == len(DATES)
 
 

@@ -99,7 +99,7 @@ def test_a_payload_is_told_in_kg_and_what_it_leaves_over_is_no_other_change(monk
     both = changes_of(quill_fleet(0, scatter, payload=5.0, gain=0.05))[WORN]
     assert {change.cause.effect for change in both} == {"inertia", "torque_scale"}
     # The hundredth of it that is a ripple would be one more.
-    monkeypatch.setattr(changes, "MIN_BESIDE", 0.0)
+    monkeypatch.setattr(changes, "MIN_OVER_UNEXPLAINED", 0.0)
     assert len(changes_of(fleet)[WORN]) == 2
 
 

@@ -17,7 +17,7 @@ from scara_ident.identification import ESTIMATORS
 from scara_ident.identification.identify import (
     Identification,
     identify,
-    not_told_from_zero,
+    insignificant_parameters,
     undetermined,
     worst_validation,
 )
@@ -206,7 +206,7 @@ def test_a_motion_of_one_joint_leaves_the_other_undetermined(robot: Robot, clean
     assert result.log_det == -np.inf
     assert result.condition == np.inf
     assert result.training_errors()["one_1"][1] is None
-    assert not set(not_told_from_zero(result)) & lost
+    assert not set(insignificant_parameters(result)) & lost
 
 
 def test_repetitions_tell_the_noise_and_residuals_weigh_the_joints(robot: Robot, clean: Recording):

@@ -46,7 +46,7 @@ def stand_in(monkeypatch: pytest.MonkeyPatch, crash: str = "", refuse: str = "")
         return path.stem, os.getpid()
 
     monkeypatch.setattr(apart, "read_recording", read)
-    monkeypatch.setattr(apart, "told_apart", tuple)
+    monkeypatch.setattr(apart, "distinctly_named", tuple)
 
 
 def test_recordings_are_read_in_one_other_process_and_each_once(

@@ -9,8 +9,8 @@ import pytest
 
 from scara_ident.identification.compare import compare
 from scara_ident.report.comparison import comparison_dict, comparison_sentences
-from scara_ident.report.told.comparison import tables
-from scara_ident.report.told.words import text_of
+from scara_ident.report.summaries.comparison import tables
+from scara_ident.report.summaries.words import text_of
 from scara_ident.robot.robot import load_robot
 from tests.diagnosis.made import BANDS, complete, exact_runs, with_torque
 

@@ -58,7 +58,7 @@ def test_where_the_effects_make_it_worse_it_is_said(result):
 
 
 @pytest.mark.parametrize(
-    ("std", "told_as", "said"),
+    ("std", "even_power", "said"),
     [
         (150.0, -1.0, "stiffness 3.84e+03 ± 2e+02 N m/rad"),
         (1504.0, 1.0, "stiffness 3.84e+03 ± 2e+03 N m/rad"),
@@ -69,8 +69,8 @@ def test_where_the_effects_make_it_worse_it_is_said(result):
         (np.inf, -1.0, "stiffness about 3.84e+03 N m/rad (not told by recordings)"),
     ],
 )
-def test_an_interval_is_said_where_a_standard_deviation_says_too_little(std: float, told_as: float, said: str):
-    assert quantity("stiffness", Parameter(3845.0, std, "N m/rad", told_as)) == said
+def test_an_interval_is_said_where_a_standard_deviation_says_too_little(std: float, even_power: float, said: str):
+    assert quantity("stiffness", Parameter(3845.0, std, "N m/rad", even_power)) == said
 
 
 def test_what_says_the_law_has_no_uncertainty():
@@ -125,24 +125,24 @@ def test_the_rotor_that_a_result_rests_on_is_told_where_nobody_stated_it(result)
     ]
     (entry,) = diagnosis_dict(replace(result, rotors=(told,)))["rotors"]
     assert entry == {
-        "joint": "joint1", "armature": 4.1, "factor": 1.02, "unit": "kg m^2", "nominal": 2.4, "stated": False, "told": True,
+        "joint": "joint1", "armature": 4.1, "factor": 1.02, "unit": "kg m^2", "nominal": 2.4, "stated": False, "determined": True,
     }  # fmt: skip
     assert diagnosis_dict(result)["rotors"] == []
 
 
 def test_an_effect_that_is_there_and_whose_size_is_not_told_says_so(result):
     (effect,) = result.effects
-    assert diagnosis_dict(result)["effects"][0]["size_told"] is True
-    unsure = replace(result, effects=(replace(effect, size_told=False),))
+    assert diagnosis_dict(result)["effects"][0]["size_determined"] is True
+    unsure = replace(result, effects=(replace(effect, size_determined=False),))
     said = f"it is there by what it removes (p = {effect.p_value:.1e}), but its size is not settled"
     assert said in " ".join(sentences(unsure))
     assert "not settled" not in " ".join(sentences(result))
     # What those held out speak against is not said to be there.
     against = HeldOutGain(-0.3, 0.1, 0.05, "joint2", 0.02, 0.03)
-    doubted = " ".join(sentences(replace(result, effects=(replace(effect, size_told=False, held_out=against),))))
+    doubted = " ".join(sentences(replace(result, effects=(replace(effect, size_determined=False, held_out=against),))))
     assert "In doubt: spring on joint2" in doubted
     assert "not settled" not in doubted
-    assert diagnosis_dict(unsure)["effects"][0]["size_told"] is False
+    assert diagnosis_dict(unsure)["effects"][0]["size_determined"] is False
 
 
 def test_the_verdict_comes_first_then_what_was_found_then_why_not_more_and_what_is_worth_a_look_after_the_errors(

@@ -8,14 +8,14 @@ from pathlib import Path
 import pytest
 
 from scara_ident.diagnosis import Diagnosis, diagnose
-from scara_ident.estimation.urdf_weight import told_scale, turned_bodies
+from scara_ident.estimation.urdf_weight import scale_in_words, turned_bodies
 from scara_ident.identification.identify import Identification, identify
 from scara_ident.report.diagnosis import diagnosis_dict
 from scara_ident.report.diagnosis_markdown import diagnosis_markdown
 from scara_ident.report.doubts import doubts, parted
 from scara_ident.report.html.diagnosis import DiagnosisContext, diagnosis_report
 from scara_ident.report.html.identification import IdentificationContext, identification_report
-from scara_ident.report.identification import identification_dict, told
+from scara_ident.report.identification import headline_and_details, identification_dict
 from tests.identification.test_gravity_check import DOWN, UP, made
 
 BANDS = (8.0,) * 3
@@ -69,7 +69,7 @@ def test_the_same_of_a_diagnosis(diagnosed: Diagnosis, tmp_path: Path):
 def test_efforts_that_count_backwards_stand_there_too_and_nothing_is_said_of_bodies(tmp_path: Path):
     robot, run = made(tmp_path, DOWN, DOWN)
     result = identify(robot, [replace(run, effort=-run.effort)], model="basic", bands=BANDS)
-    first, others = told(result)
+    first, others = headline_and_details(result)
     assert first == (f"{result.channels[0]}.",)
     assert "negate effort_gain" in first[0]
     assert not any("egate" in note for note in result.notes)
@@ -80,7 +80,7 @@ def test_efforts_that_count_backwards_stand_there_too_and_nothing_is_said_of_bod
 def test_a_right_arm_is_not_in_doubt_and_its_scale_is_told_last(tmp_path: Path):
     robot, run = made(tmp_path, DOWN, DOWN)
     result = identify(robot, [run], model="basic", bands=BANDS)
-    first, others = told(result)
+    first, others = headline_and_details(result)
     assert first == ()
     assert others[-1].startswith("No recording tells a scale")
     assert identification_dict(result)["doubts"] == []
@@ -89,13 +89,13 @@ def test_a_right_arm_is_not_in_doubt_and_its_scale_is_told_last(tmp_path: Path):
 def test_bodies_of_the_opposite_sign_are_a_doubt_where_friction_does_not_brake_and_said_once(tmp_path: Path):
     robot, run = made(tmp_path, DOWN, DOWN)
     result = identify(robot, [run], model="basic", bands=BANDS)
-    scale = told_scale(result.estimate, result.training)
+    scale = scale_in_words(result.estimate, result.training)
     assert "opposite sign" in scale and "though friction brakes there" in scale
     assert doubts(result.estimate, result.training, result.training, scale) == ()
     # Without friction nothing tells that efforts have the sign of the positions.
     robot, run = made(tmp_path, DOWN, DOWN, friction=0.0)
     result = identify(robot, [run], model="basic", bands=BANDS)
     assert turned_bodies(result.estimate, result.training) != ()
-    first, others = told(result)
+    first, others = headline_and_details(result)
     assert "negate effort_gain there" in first[0]
     assert others.count(first[0]) == 0

@@ -18,9 +18,9 @@ from scara_ident.robot.kinematics import (
     leaning_torques,
     parent,
     place_of,
-    told_at_once,
     tool_frame,
     tool_placement,
+    weakest_direction,
 )
 from scara_ident.robot.robot import load_robot
 from tests.arms import example_urdf
@@ -122,6 +122,6 @@ def test_directions_that_an_arm_feels_and_what_it_feels_of_them_at_once():
     assert felt_directions(flat, rng.uniform(-1.0, 1.0, (5, flat.model.nq))) == 2
     assert felt_directions(arm, rng.uniform(-1.0, 1.0, (5, arm.model.nq))) == 3
     bent, stretched = (list(force_torques(flat, [np.array([0.3, elbow])])) for elbow in (1.5, 1e-3))
-    assert told_at_once(bent, 2) > 0.2
-    assert told_at_once(stretched, 2) < 1e-3
-    assert told_at_once(bent, 3) == 0.0
+    assert weakest_direction(bent, 2) > 0.2
+    assert weakest_direction(stretched, 2) < 1e-3
+    assert weakest_direction(bent, 3) == 0.0

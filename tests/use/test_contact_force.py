@@ -32,8 +32,8 @@ def off(found: Contact, force: np.ndarray) -> float:
 
 def test_a_force_on_the_tool_is_placed_there(observer: ContactObserver):
     found = contact(observer, 7, FORCE)
-    assert found.told.at_tool
-    assert (found.place, found.told.point, found.told.point_std) == ("tool", None, None)
+    assert found.estimate.at_tool
+    assert (found.place, found.estimate.point, found.estimate.point_std) == ("tool", None, None)
     assert off(found, FORCE) < 2.0
 
 
@@ -51,7 +51,7 @@ def test_a_force_beside_the_tool_is_told_with_its_point(observer: ContactObserve
         assert off(found, force) < 3.0
         np.testing.assert_allclose(found.force, force, atol=0.1 * 80.0)
         # Along the force no point is told from another.
-        assert np.all(np.abs(turn @ beside + origin - found.told.point) < 3.0 * found.told.point_std)
+        assert np.all(np.abs(turn @ beside + origin - found.estimate.point) < 3.0 * found.estimate.point_std)
         placed += 1
     # The others load the last joint too little to tell them from a force on the link before.
     assert placed >= 4
@@ -61,11 +61,11 @@ def test_the_entry_has_the_point(observer: ContactObserver):
     found = look_for_contact(observer, [pushed(quiet(7), 2.0 * FORCE, 8.0, 9.0, beside=np.array([0.0, 0.1, 0.05]))])
     (entry,) = contacts_dict(found)["contacts"]
     assert entry["place"] == "wrist_3_link"
-    assert entry["point"] == found.contacts[0].told.point.tolist()
-    assert entry["point_std"] == found.contacts[0].told.point_std.tolist()
+    assert entry["point"] == found.contacts[0].estimate.point.tolist()
+    assert entry["point_std"] == found.contacts[0].estimate.point_std.tolist()
     assert len(entry["force"]) == 3
 
 
 def test_what_does_not_load_the_last_joint_is_told_no_force_beside_the_tool(observer: ContactObserver):
     found = contact(observer, 8, 2.0 * FORCE, joints=4)
-    assert (found.place, found.force, found.told.point) == ("wrist_1_link", None, None)
+    assert (found.place, found.force, found.estimate.point) == ("wrist_1_link", None, None)

@@ -32,13 +32,13 @@ def without_not_finite(
     kept = tuple(item for item in candidates if item not in where)
     tried = {item.label(scene) for item in kept}
     # By effect, and whether nothing of it can be tried: joints and recordings, in their order.
-    told: dict[tuple[str, bool], tuple[dict[str, None], dict[str, None]]] = {}
+    lines: dict[tuple[str, bool], tuple[dict[str, None], dict[str, None]]] = {}
     for item, names in where.items():
-        joints, recordings = told.setdefault((item.effect.name, item.label(scene) not in tried), ({}, {}))
+        joints, recordings = lines.setdefault((item.effect.name, item.label(scene) not in tried), ({}, {}))
         joints[item.joint(scene) or "the arm"] = None
         recordings.update(dict.fromkeys(names))
     notes = []
-    for (name, wholly), (joints, recordings) in told.items():
+    for (name, wholly), (joints, recordings) in lines.items():
         label = f"{name} of {listed(list(joints), MAX_NAMED)}"
         some = {item.name for item in columns.observations.data.recordings} - set(recordings)
         place = listed(list(recordings), MAX_NAMED) if some else "any recording"

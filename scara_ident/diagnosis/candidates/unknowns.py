@@ -87,7 +87,7 @@ def unknowns_of(scene: Scene, chosen: Sequence[Candidate], rotor_inertia_std: fl
     joints = [candidate.effect.geared_joint(candidate.member) for candidate in chosen]
     for joint in dict.fromkeys(joint for joint in joints if joint is not None):
         nominal = scene.nominal_armature(joint)
-        if scene.told_armature(joint) is None and nominal > 0.0:
+        if scene.known_armature(joint) is None and nominal > 0.0:
             found.append(_armature(scene, joint, nominal, rotor_inertia_std))
     return tuple(found)
 

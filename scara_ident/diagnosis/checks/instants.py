@@ -27,9 +27,9 @@ def with_instants_of_each(step: SelectionStep, place: int, parameters: Mapping[s
     found = dict(parameters)
     effect = step.chosen[place].effect
     for k, item in enumerate(effect.nonlinear):
-        told = found.get(item.name)
-        if item.jumps and told is not None and 0.0 < told.std < step.scene.duration:
-            found[item.name] = replace(told, std=max(told.std, _jackknife(step, place, k, told.std)))
+        instant = found.get(item.name)
+        if item.jumps and instant is not None and 0.0 < instant.std < step.scene.duration:
+            found[item.name] = replace(instant, std=max(instant.std, _jackknife(step, place, k, instant.std)))
     return found
 
 

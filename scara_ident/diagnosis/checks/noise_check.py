@@ -218,7 +218,7 @@ def _examined_below(
     if out is not None:
         columns = columns.beside(columns.observations.with_torque(corrected(columns.observations.data, out)))
     # What the filter of so narrow a band does to the motion itself is none of the candidate's.
-    beside = [Candidate(*item) for item in candidate.effect.told_apart_from(step.scene, candidate.member)]
+    beside = [Candidate(*item) for item in candidate.effect.distinguished_from(step.scene, candidate.member)]
     variation = offsets_on(columns.observations, step.offsets)
     below = replace(step, columns=columns, variation=variation)
     model = replace(below, chosen=(*step.chosen, *beside)).model if beside else below.model

@@ -33,18 +33,18 @@ def parameters_of_laws(step: SelectionStep) -> PhysicalParameters:
     for place, item in enumerate(step.chosen):
         effects[place] = {**effects[place], **item.effect.law()}
         for other in _as_good(step, place):
-            told = physical_parameters(other)
-            effects = [widened(each, its) for each, its in zip(effects, told.effects, strict=True)]
-            linear = _apart(linear, told, np.arange(len(linear.value)))
+            elsewhere = physical_parameters(other)
+            effects = [widened(each, its) for each, its in zip(effects, elsewhere.effects, strict=True)]
+            linear = _apart(linear, elsewhere, np.arange(len(linear.value)))
     for other in chain(as_good(step), _beside_rest(step)):
-        told = physical_parameters(other)
+        elsewhere = physical_parameters(other)
         # What other rows say of the base model is less, and no other fit of these.
         same_rows = other.columns is step.columns
         for place, item in enumerate(step.chosen):
             if same_rows or item.effect.together:
-                effects[place] = widened(effects[place], told.effects[place])
-        linear = _apart(linear, told, np.arange(len(linear.value)) if same_rows else _places(step, own))
-    effects = [with_instants_of_each(step, place, told) for place, told in enumerate(effects)]
+                effects[place] = widened(effects[place], elsewhere.effects[place])
+        linear = _apart(linear, elsewhere, np.arange(len(linear.value)) if same_rows else _places(step, own))
+    effects = [with_instants_of_each(step, place, elsewhere) for place, elsewhere in enumerate(effects)]
     return replace(own, effects=tuple(effects), linear=linear)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from scara_ident.diagnosis.candidates.candidates import Candidate, CandidateColumns, columns_at_hand
 from scara_ident.diagnosis.checks.same_errors import same
-from scara_ident.diagnosis.fitting.effect_parameters import physical_parameters, told_size
+from scara_ident.diagnosis.fitting.effect_parameters import physical_parameters, size_is_determined
 from scara_ident.diagnosis.fitting.linearised import linearise
 from scara_ident.diagnosis.fitting.nonlinear_fit import MIN_DECREASE, RISE, tune
 from scara_ident.diagnosis.fitting.part_of_recordings import on_all, on_part
@@ -91,8 +91,12 @@ def quieter(step: SelectionStep) -> SelectionStep | None:
     below = _below(step) if places else None
     if below is None or noisy(below.observations.data, OF_LAG) or not _moved_by_noise(step, below, places):
         return None
-    told = zip(below.chosen, physical_parameters(below).effects, strict=True)
-    return below if all(told_size(item.effect, own, step.criteria.min_final_size) for item, own in told) else None
+    other = zip(below.chosen, physical_parameters(below).effects, strict=True)
+    return (
+        below
+        if all(size_is_determined(item.effect, own, step.criteria.min_final_size) for item, own in other)
+        else None
+    )
 
 
 def _together(step: SelectionStep) -> list[int]:
@@ -235,9 +239,9 @@ def _differing(
     ]
 
 
-def widened(own: Mapping[str, Parameter], told: Mapping[str, Parameter]) -> dict[str, Parameter]:
+def widened(own: Mapping[str, Parameter], other: Mapping[str, Parameter]) -> dict[str, Parameter]:
     """Return parameters for which what those of a fit as good differ by is one more standard deviation."""
     return {
-        name: replace(one, std=float(np.hypot(one.std, told[name].value - one.value))) if name in told else one
+        name: replace(one, std=float(np.hypot(one.std, other[name].value - one.value))) if name in other else one
         for name, one in own.items()
     }

@@ -6,7 +6,7 @@ import numpy as np
 
 from scara_ident.diagnosis.checks.noise_check import noise_left
 from scara_ident.diagnosis.testing.acceptance import Decision
-from scara_ident.diagnosis.testing.moments import moments_told
+from scara_ident.diagnosis.testing.moments import moments_of_blocks
 from scara_ident.diagnosis.testing.selection_step import SelectionStep
 
 
@@ -15,7 +15,7 @@ def same(own: tuple[SelectionStep, Decision], other: tuple[SelectionStep, Decisi
 
     What either lacks is the same in every repetition of a motion: these count as one.
     """
-    worse = np.bincount(moments_told(own[0])[2], other[1].examination.left - own[1].examination.left)
+    worse = np.bincount(moments_of_blocks(own[0])[2], other[1].examination.left - own[1].examination.left)
     difference, least = float(np.sum(worse)), own[0].criteria.alike * float(np.sqrt(len(worse) * np.var(worse)))
     if abs(difference) < least:
         return True

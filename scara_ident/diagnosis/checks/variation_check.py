@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from scara_ident.diagnosis.candidates.candidates import with_columns
-from scara_ident.diagnosis.fitting.correction import told_beside
+from scara_ident.diagnosis.fitting.correction import correction_step
 from scara_ident.diagnosis.testing.acceptance import Decision
 from scara_ident.diagnosis.testing.candidate_tests import examine, gains
 from scara_ident.diagnosis.testing.row_test import examine_rows
@@ -78,7 +78,7 @@ def _alike(step: SelectionStep, decision: Decision) -> str | None:
         chance = "" if shared is None else f" (p = {shared.p_value:.1e})"
         return f"that recordings differ in it may be chance, by how the joints disagree{chance}"
     try:
-        beside = told_beside(step, decision.candidate)
+        beside = correction_step(step, decision.candidate)
     except RecordingError as error:
         return f"the lower part of the band does not tell it: {error}"
     (again,) = beside.judge([decision.candidate])

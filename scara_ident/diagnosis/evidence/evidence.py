@@ -296,9 +296,9 @@ def min_found(found: Search, decision: Decision, criteria: SelectionCriteria = C
     size = max(errors * np.sqrt(examined.covariance[0, 0]), np.sqrt(share * left / examined.products[0, 0]))
     if not np.isfinite(size):
         return {}
-    told = candidate.effect.parameters(scene, candidate.member, np.array([size]), np.zeros((1, 1)))
+    sizes = candidate.effect.parameters(scene, candidate.member, np.array([size]), np.zeros((1, 1)))
     # Others, such as where a spring is at rest, stand behind it.
-    return dict([next(iter(told.items()))])
+    return dict([next(iter(sizes.items()))])
 
 
 def coloured_shares(residuals: Residuals, made: Sequence[Array] | None = None) -> Array:

@@ -166,13 +166,13 @@ def tentative_lines(
     lines: Sequence[StandingLine | None],
     found: Search,
     families: Sequence[Effect],
-    told: Collection[tuple[str, str | None]],
+    found_lines: Collection[tuple[str, str | None]],
 ) -> tuple[TentativeEffect, ...]:
     """Return what may make the lines that stay, of the effects that are looked for by frequency.
 
     Parameters
     ----------
-    told : collection of (str, str or None)
+    found_lines : collection of (str, str or None)
         Name and joint of the effects in the model and of those worth a look, which are not listed again.
     """
     scene, result = found.scene, []
@@ -184,7 +184,7 @@ def tentative_lines(
                 continue
             for member in effect.seeds(scene, line.joint, SpectralLine("frequency", line.frequency)):
                 joint = Candidate(effect, member).joint(scene)
-                if (effect.name, joint) not in told:
+                if (effect.name, joint) not in found_lines:
                     words = effect.description(scene, member)
                     result.append(
                         TentativeEffect(effect.name, joint, words, why, effect.experiment, gain, line.p_value)

@@ -78,7 +78,7 @@ def corrected(data: PreparedData, correction: Correction) -> PreparedData:
     return replace(data, recordings=tuple(mended))
 
 
-def told_beside(step: SelectionStep, candidate: Candidate) -> SelectionStep:
+def correction_step(step: SelectionStep, candidate: Candidate) -> SelectionStep:
     """Return the step that the size of a correction is told beside.
 
     What each recording has of its own is told in the lower part of the band: a controller answers the noise of positions, which
@@ -114,11 +114,11 @@ def drawn_together(value: Array, covariance: Array) -> Array:
     covariance : ndarray, shape (k, k)
         Of these; what all are unsure by alike draws none of them to another. No variance is that of one that tells nothing.
     """
-    told = np.diag(covariance) > 0.0
-    count = int(np.count_nonzero(told))
+    determined = np.diag(covariance) > 0.0
+    count = int(np.count_nonzero(determined))
     if count < 2:
-        return np.full(len(value), np.mean(value[told]) if count else 0.0)
-    own, whole = value[told], covariance[np.ix_(told, told)]
+        return np.full(len(value), np.mean(value[determined]) if count else 0.0)
+    own, whole = value[determined], covariance[np.ix_(determined, determined)]
 
     def contrasts(variance: Array) -> tuple[Array, Array]:
         """Return the precision of what lies off the mean, and the share of each in the mean."""
@@ -131,7 +131,7 @@ def drawn_together(value: Array, covariance: Array) -> Array:
     between = max(0.0, float(own @ within @ own) - (count - 1)) / float(np.trace(within))
     within, shares = contrasts(whole + between * np.eye(count))
     drawn = np.full(len(value), float(shares @ own))
-    drawn[told] += between * (within @ own)
+    drawn[determined] += between * (within @ own)
     return drawn
 
 
@@ -141,7 +141,7 @@ def still_there(step: SelectionStep, candidate: Candidate, whole: Array) -> Arra
     Parameters
     ----------
     step : SelectionStep
-        See `told_beside`.
+        See `correction_step`.
     candidate : Candidate
     whole : ndarray, shape (k,)
     """
@@ -168,7 +168,7 @@ def taken_out(step: SelectionStep, candidate: Candidate) -> tuple[CandidateColum
     """
     names = tuple(item.name for item in step.observations.data.recordings)
     whole, last, whole_band = np.zeros(len(candidate.effect.columns(step.scene, candidate.member))), np.inf, step
-    step = told_beside(step, candidate)
+    step = correction_step(step, candidate)
     seen, before, moved = 1.0, whole, whole
     for _ in range(MAX_CORRECTIONS):
         value = still_there(step, candidate, whole)

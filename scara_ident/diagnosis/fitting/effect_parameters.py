@@ -23,10 +23,10 @@ from scara_ident.estimation.noise_bias import OF_LAG, noisy
 from scara_ident.estimation.run_offsets import beside_offsets
 from scara_ident.estimation.run_variation import MIN_RUNS
 from scara_ident.estimation.variation_between import run_variation
-from scara_ident.estimation.working_range import Told, told_directions
+from scara_ident.estimation.working_range import DeterminedDirections, determined_directions
 
 # A rotor is told by the data where they leave less than this share of its prior's standard deviation.
-TOLD_SHARE = 0.7
+DETERMINED_SHARE = 0.7
 # Logarithm that no factor of an armature exceeds: more is nothing known.
 LARGEST_LOG = 20.0
 
@@ -45,7 +45,7 @@ class RotorInertia:
         Whether the robot's description or its URDF states it.
     nominal : float
         As stated, or guessed (`scara_ident.robot.rotors`).
-    told : bool
+    determined : bool
         Whether these recordings make it surer than that.
     """
 
@@ -54,7 +54,7 @@ class RotorInertia:
     factor: float | None
     stated: bool
     nominal: float
-    told: bool
+    determined: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +104,7 @@ class PhysicalParameters:
     linear: LinearParameters | None = None
 
 
-def told_size(effect: Effect, parameters: Mapping[str, Parameter], stds: float) -> bool:
+def size_is_determined(effect: Effect, parameters: Mapping[str, Parameter], stds: float) -> bool:
     """Whether any of an effect's sizes, its nonlinear parameters left aside, is so many standard deviations from none."""
     others = {"phase", *(parameter.name for parameter in effect.nonlinear)}
     sizes = [parameter for name, parameter in parameters.items() if name not in others]
@@ -139,8 +139,8 @@ def physical_parameters(step: SelectionStep, *, of_runs: bool = True, of_noise: 
         linear = Coefficients(state.value[own], covariance[own, own])
         coefficients.append(linear)
         wide = np.r_[own, _beside(step, candidate, state)]
-        told = Coefficients(state.value[wide], covariance[np.ix_(wide, wide)])
-        parameters = _told(step.scene, candidate, told, np.flatnonzero(undetermined[wide]))
+        all_sizes = Coefficients(state.value[wide], covariance[np.ix_(wide, wide)])
+        parameters = _physical(step.scene, candidate, all_sizes, np.flatnonzero(undetermined[wide]))
         for position, unknown in enumerate(state.unknowns):
             if unknown.owner != owner:
                 continue
@@ -166,7 +166,7 @@ def physical_parameters(step: SelectionStep, *, of_runs: bool = True, of_noise: 
 
 def _beside(step: SelectionStep, candidate: Candidate, state: Linearised) -> NDArray[np.intp]:
     """Return the columns of the effect beside which a candidate's parameters are told; none where it did not come in."""
-    member = candidate.effect.told_beside(step.scene, candidate.member)
+    member = candidate.effect.estimated_beside(step.scene, candidate.member)
     places = [
         np.r_[own]
         for item, own in zip(step.chosen, state.places, strict=True)
@@ -175,10 +175,10 @@ def _beside(step: SelectionStep, candidate: Candidate, state: Linearised) -> NDA
     return np.concatenate([np.array([], dtype=np.intp), *places])
 
 
-def _told(
+def _physical(
     scene: Scene, candidate: Candidate, linear: Coefficients, left_open: NDArray[np.intp]
 ) -> dict[str, Parameter]:
-    """Return physical parameters from coefficients; one that changes with a coefficient that is left open is not told."""
+    """Return physical parameters from coefficients; one that changes with a coefficient that is left open is undetermined."""
     effect, member = candidate.effect, candidate.member
     found = dict(effect.parameters(scene, member, linear.value, linear.covariance))
     for k in left_open:
@@ -196,10 +196,10 @@ def _further(scene: Scene, candidate: Candidate, linear: Coefficients, parameter
     A coefficient that is told by its name among the physical parameters is as unsure as it is there: a family may know of more.
     """
     names = [column.name for column in candidate.effect.columns(scene, candidate.member)]
-    told = [parameters.get(name) for name in names]
+    named = [parameters.get(name) for name in names]
     same = [
         item.std**2 if item is not None and item.value == x and np.isfinite(item.std) else 0.0
-        for item, x in zip(told, linear.value, strict=True)
+        for item, x in zip(named, linear.value, strict=True)
     ]
     return np.asarray(np.maximum(np.array(same) - np.diag(linear.covariance), 0.0))
 
@@ -218,7 +218,7 @@ def _rotors(step: SelectionStep, state: Linearised, covariance: Array) -> tuple[
             float(np.exp(min(spread[joint], LARGEST_LOG))) if joint in spread else None,
             bool(scene.robot.rotor_stated[joint]),
             scene.nominal_armature(joint),
-            joint not in spread or spread[joint] < TOLD_SHARE * prior[joint],
+            joint not in spread or spread[joint] < DETERMINED_SHARE * prior[joint],
         )
         for joint in dict.fromkeys(joint for joint in behind if joint is not None)
     )
@@ -247,8 +247,12 @@ def _covariance(
     step: SelectionStep, state: Linearised, *, of_runs: bool, of_noise: bool
 ) -> tuple[Covariance, Array | None]:
     """Block covariance of all parameters, with what the priors leave open, which no residual shows, and the bias that is in it."""
-    whole, told = merge([state.information, state.prior]), _told_directions(step, state)
-    inverse = whole.inverse() if told is None else told.kept @ told.within(whole).inverse() @ told.kept.T
+    whole, directions = merge([state.information, state.prior]), _determined_directions(step, state)
+    inverse = (
+        whole.inverse()
+        if directions is None
+        else directions.kept @ directions.within(whole).inverse() @ directions.kept.T
+    )
     # By what a row moves the fit; see `scara_ident.estimation.run_offsets`.
     rows = beside_offsets(replace(step.observations, joints=tuple(state.joints)), step.offsets)
     influence = rows.influence.joints
@@ -259,9 +263,9 @@ def _covariance(
         if step.offsets is not None and len(step.observations.data.recordings) < MIN_RUNS:
             variation = step.offsets
         matrix = matrix + variation.covariance(inverse, influence, step.weights)
-    if told is not None:
-        matrix = matrix + told.prior
-    bias = _noise_bias(step, state) if of_noise and told is None else None
+    if directions is not None:
+        matrix = matrix + directions.prior
+    bias = _noise_bias(step, state) if of_noise and directions is None else None
     if bias is not None:
         matrix = matrix + np.outer(bias, bias)
     known = state.prior.factor[:, :-1]
@@ -269,19 +273,19 @@ def _covariance(
     return replace(spread, matrix=matrix), bias
 
 
-def _told_directions(step: SelectionStep, state: Linearised) -> Told | None:
-    """Return what is told and what is left open where data were corrected alone, see `told_directions`; None where all is told."""
+def _determined_directions(step: SelectionStep, state: Linearised) -> DeterminedDirections | None:
+    """Return what is told and what is left open where data were corrected alone, see `determined_directions`; None where all of it is determined."""
     if any(not item.corrects_data for item in state.chosen):
         return None
-    told = told_directions(beside_offsets(step.observations, step.offsets).fitted, 1.0 / step.weights)
-    if told is None:
+    directions = determined_directions(beside_offsets(step.observations, step.offsets).fitted, 1.0 / step.weights)
+    if directions is None:
         return None
     # Imported where it is needed, as it takes as long as all else here.
     from scipy.linalg import block_diag
 
-    more = state.information.parameters - len(told.kept)
-    left_open = np.vstack([told.left_open, np.zeros((more, told.left_open.shape[1]))])
-    return Told(block_diag(told.kept, np.eye(more)), left_open)
+    more = state.information.parameters - len(directions.kept)
+    left_open = np.vstack([directions.left_open, np.zeros((more, directions.left_open.shape[1]))])
+    return DeterminedDirections(block_diag(directions.kept, np.eye(more)), left_open)
 
 
 def _noise_bias(step: SelectionStep, state: Linearised) -> Array | None:

@@ -39,14 +39,14 @@ def _telling(step: SelectionStep) -> list[int]:
     """Return the places of the recordings that tell the effects: those first that tell most of them."""
     observations = step.observations
     seconds = sum(part.samples / part.rate for part in observations.data.stretches)
-    told = _told(step)
-    shares = told / np.maximum(np.sum(told, axis=1, keepdims=True), np.finfo(float).tiny)
+    strengths = _strengths(step)
+    shares = strengths / np.maximum(np.sum(strengths, axis=1, keepdims=True), np.finfo(float).tiny)
     order = np.argsort(-np.sum(shares, axis=0), kind="stable")
     enough = seconds * np.min(np.cumsum(shares[:, order], axis=1), axis=0) >= ENOUGH
     return sorted(order[: int(np.argmax(enough)) + 1 if np.any(enough) else None].tolist())
 
 
-def _told(step: SelectionStep) -> Array:
+def _strengths(step: SelectionStep) -> Array:
     """Return what each recording tells of each effect, shape (effects, recordings): the weighted square of its columns."""
     observations = step.observations
     found = np.zeros((len(step.chosen), len(observations.data.recordings)))

@@ -44,19 +44,19 @@ def own_correction(
     candidate, column = found.correction.candidate, found.correction.candidate.effect.coefficients[0]
     mean, apart = float(np.mean(found.correction.value)), float(np.var(found.correction.value, ddof=1))
 
-    def told_by(data: PreparedData) -> dict[str, tuple[float, float]]:
+    def corrections_of(data: PreparedData) -> dict[str, tuple[float, float]]:
         each = observe(found.base, data).each if data.recordings else ()
         return {one.name: _fitted_alone(found, candidate, one, scene, after) for one in each}
 
-    known = told_by(training)
+    known = corrections_of(training)
     off = np.array([value - found.correction.of(name)[0] for name, (value, _) in known.items()])
     # Of a normal distribution the median square is this share of the mean; what happened in one of them does not count.
     wrong = float(np.median(off**2)) / MEDIAN_SQUARE if len(off) else np.inf
 
-    def drawn(told: float, variance: float) -> float:
-        return mean + (apart / (apart + max(wrong, variance)) * (told - mean) if apart > 0.0 else 0.0)
+    def drawn(determined: float, variance: float) -> float:
+        return mean + (apart / (apart + max(wrong, variance)) * (determined - mean) if apart > 0.0 else 0.0)
 
-    own = {name: drawn(*told) for name, told in told_by(heads).items()}
+    own = {name: drawn(*determined) for name, determined in corrections_of(heads).items()}
     value = np.array([own.get(name, mean) for name in names])
     notes = [
         f"{name}: {column.name} {x:.3g} {column.unit} by its first third"
@@ -99,7 +99,7 @@ def _fitted_alone(
             break
         whole, last = whole + more, abs(more)
         one = one.with_torque(corrected(data, Correction(candidate, np.array([whole]), (one.name,))))
-    told = sizes > 0.0
-    apart = float(np.sum((aims[told] - more * sizes[told]) ** 2 / sizes[told]))
-    scatter = max(1.0, apart / (np.count_nonzero(told) - 1)) if np.count_nonzero(told) > 1 else 1.0
+    determined = sizes > 0.0
+    apart = float(np.sum((aims[determined] - more * sizes[determined]) ** 2 / sizes[determined]))
+    scatter = max(1.0, apart / (np.count_nonzero(determined) - 1)) if np.count_nonzero(determined) > 1 else 1.0
     return whole, scatter / float(np.sum(sizes))

@@ -17,7 +17,7 @@ from scara_ident.diagnosis.testing.selection_step import moments_of, observed
 from scara_ident.estimation import Estimate
 from scara_ident.estimation.another_run import variance_of_another_run
 from scara_ident.estimation.joint_rows import JointRows
-from scara_ident.estimation.least_squares import told_value_and_weights
+from scara_ident.estimation.least_squares import determined_value_and_weights
 from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.run_offsets import offsets_on
 from scara_ident.recording.recording import Recording
@@ -169,13 +169,13 @@ def _each_left_out(
         columns = np.arange(start, stop)
         start = stop
         if any(np.any(rows.table[:-1][np.isin(rows.columns, columns)]) for rows in held_out.joints):
-            value, _ = told_value_and_weights(observed(found.step.without(place)), after.offsets)
+            value, _ = determined_value_and_weights(observed(found.step.without(place)), after.offsets)
             value = np.insert(value, np.full(len(columns), columns[0]), 0.0)
             own = None if candidate.effect.all_joints else candidate.member.joint
             yield candidate.label(scene), own, _errors(held_out.joints, value), errors
     if correction is not None:
         step = replace(found.step, columns=found.step.columns.beside(found.uncorrected))
-        value, _ = told_value_and_weights(observed(step), after.offsets)
+        value, _ = determined_value_and_weights(observed(step), after.offsets)
         candidate = correction.candidate
         joints = held_out.with_torque(uncorrected.data).faded(quiet).joints
         # Both of the recordings as they are: what correcting makes of their noise would count as half of the effect.

@@ -23,7 +23,7 @@ from scara_ident.motion.prepared import ROWS_PER_PERIOD
 ROUNDS = 6
 
 
-def told_by_others(
+def intervals_by_others(
     one: Observations, scene: Scene, chosen: Sequence[Candidate], which: int, value: Array, weights: Array
 ) -> tuple[tuple[Interval, ...], tuple[Interval, ...]]:
     """Return the intervals of a recording in which an effect acts on each joint, as the others tell, and as all tell.
@@ -46,13 +46,13 @@ def told_by_others(
     first, last = (float(edge) - scene.start[one.name] for edge in time[[0, -1]])
 
     def intervals(joints: Sequence[JointSeen], joint: int | None) -> list[Interval]:
-        return [Interval(place, *times, joint) for times in _told(joints, (first, last), scene.band)]
+        return [Interval(place, *times, joint) for times in _active_times(joints, (first, last), scene.band)]
 
     apart = [item for j in range(len(seen)) for item in intervals([*seen[:j], *seen[j + 1 :]], j)]
     return tuple(apart), tuple(intervals(seen, None))
 
 
-def _told(
+def _active_times(
     seen: Sequence[JointSeen], reach: tuple[float, float], band: float
 ) -> list[tuple[float, float, float, float]]:
     """Return when an effect begins and ends to act, and how sure that is, by the rows of some joints."""

@@ -16,7 +16,7 @@ from scara_ident.diagnosis.candidates.candidates import Candidate, CandidateColu
 from scara_ident.diagnosis.fitting.at_estimate import moved_with
 from scara_ident.diagnosis.fitting.correction import Correction, corrected, lower_bands
 from scara_ident.diagnosis.held_out.correction import own_correction
-from scara_ident.diagnosis.held_out.intervals import told_by_others, words_of
+from scara_ident.diagnosis.held_out.intervals import intervals_by_others, words_of
 from scara_ident.diagnosis.selection.search import Search
 from scara_ident.effects import Scene
 from scara_ident.estimation import Estimate
@@ -114,7 +114,7 @@ def _in_intervals(found: Search, value: Array, weights: Array, held: HeldOut, ti
         for one in _observed(found, held.data, held.correction).each:
             for k in timed:
                 item = chosen[k]
-                apart, seen = told_by_others(one, held.scene, held.chosen, k, value, weights)
+                apart, seen = intervals_by_others(one, held.scene, held.chosen, k, value, weights)
                 chosen[k] = replace(item, member=replace(item.member, intervals=(*item.member.intervals, *apart)))
                 notes.append(
                     f"{one.name}: {item.effect.name} acts {words_of(seen)}; each joint is predicted with the intervals that the "

@@ -13,7 +13,7 @@ from scara_ident.diagnosis.checks.noise_check import BY_NOISE, made_by_noise, no
 from scara_ident.diagnosis.checks.remainder_check import remainder_objection
 from scara_ident.diagnosis.checks.same_errors import same
 from scara_ident.diagnosis.checks.variation_check import variation_objection
-from scara_ident.diagnosis.fitting.effect_parameters import Coefficients, physical_parameters, told_size
+from scara_ident.diagnosis.fitting.effect_parameters import Coefficients, physical_parameters, size_is_determined
 from scara_ident.diagnosis.selection.choice import fitted_with
 from scara_ident.diagnosis.selection.search import Search
 from scara_ident.diagnosis.testing.acceptance import Decision, hopeless
@@ -89,7 +89,7 @@ def _moved_by_noise(own: Coefficients, examination: Examination, essential: slic
 
 def _unsized(step: SelectionStep, candidate: Candidate, sizes: Mapping[str, Parameter]) -> str | None:
     """Say so where the size of one of several effects that act together is not told: it may mend what another lacks."""
-    if told_size(candidate.effect, sizes, step.criteria.min_size):
+    if size_is_determined(candidate.effect, sizes, step.criteria.min_size):
         return None
     return "its size is within its uncertainty beside those that it acts with, of which it may mend what they lack"
 

@@ -14,8 +14,8 @@ from scara_ident.diagnosis.checks.same_errors import same
 from scara_ident.diagnosis.checks.setpoints import setpoint_objection
 from scara_ident.diagnosis.checks.variation_check import best_first, variation_objection
 from scara_ident.diagnosis.criteria import SelectionCriteria
-from scara_ident.diagnosis.fitting.correction import MIN_RELIABILITY, still_there, taken_out, told_beside
-from scara_ident.diagnosis.fitting.effect_parameters import parameters_beside, told_size
+from scara_ident.diagnosis.fitting.correction import MIN_RELIABILITY, correction_step, still_there, taken_out
+from scara_ident.diagnosis.fitting.effect_parameters import parameters_beside, size_is_determined
 from scara_ident.diagnosis.fitting.linearised import freed_model
 from scara_ident.diagnosis.fitting.nonlinear_fit import tune
 from scara_ident.diagnosis.testing.acceptance import Decision
@@ -331,7 +331,7 @@ def _left_again(step: SelectionStep, decision: Decision) -> str | None:
     if not candidate.corrects_data:
         return None
     if candidate.effect.of_each_recording:
-        first, hidden = still_there(told_beside(step, candidate), candidate, np.zeros_like(first)), 0.0
+        first, hidden = still_there(correction_step(step, candidate), candidate, np.zeros_like(first)), 0.0
     else:
         hidden = min(max(noise_of_column(step, decision), 0.0), 1.0 - MIN_RELIABILITY)
     whole = taken_out(step, candidate)[1].value
@@ -348,6 +348,6 @@ def _insignificant(step: SelectionStep, candidate: Candidate) -> str | None:
     """Say so where the size of an effect is within its uncertainty, that of its nonlinear parameters included."""
     if not candidate.effect.nonlinear:
         return None
-    if told_size(candidate.effect, parameters_beside(step, candidate), step.criteria.min_size):
+    if size_is_determined(candidate.effect, parameters_beside(step, candidate), step.criteria.min_size):
         return None
     return "its size is within its uncertainty once its other parameters are free"

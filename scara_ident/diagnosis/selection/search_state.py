@@ -140,8 +140,8 @@ class SearchState:
             state = state.corrected(candidate)
         else:
             state = replace(state, step=replace(state.step, chosen=(*state.step.chosen, candidate)))
-        told = candidate.effect.of_each_recording or candidate.effect.settled(winner.examination.value)
-        if told or not candidate.corrects_data:
+        settled = candidate.effect.of_each_recording or candidate.effect.settled(winner.examination.value)
+        if settled or not candidate.corrects_data:
             # What each recording has of its own is taken out until nothing is left, and once more at the end.
             state = state.only({winner.label})
         # Whatever came in, effects that act together may now have another lowest minimum.

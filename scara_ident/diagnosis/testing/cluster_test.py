@@ -160,8 +160,8 @@ def _weights(
         least = _least(_of_weighted(neighbours, found)[1])
         # What the weighted blocks do not tell has no spread, and what rounding leaves of it may be less than nothing.
         square = np.trace(found.spread, axis1=1, axis2=2)
-        told = (found.strength > _MIN_REDUNDANCY) & (square > 0.0)
-        spread = np.sqrt(np.where(told, square, np.inf) / rank[places])
+        determined = (found.strength > _MIN_REDUNDANCY) & (square > 0.0)
+        spread = np.sqrt(np.where(determined, square, np.inf) / rank[places])
         size = spread * [needed(k, v, chance) for k, v in zip(rank[places], least, strict=True)]
         better = size < sizes[places]
         sizes[places[better]], weights[better], bent[better] = size[better], each[better], True

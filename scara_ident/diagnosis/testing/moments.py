@@ -17,7 +17,7 @@ from scara_ident.diagnosis.testing.selection_step import SelectionStep, moments_
 from scara_ident.estimation.joint_rows import JointRows
 
 
-def moments_told(step: SelectionStep) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
+def moments_of_blocks(step: SelectionStep) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
     """Return which moments of which motions the blocks are of.
 
     Returns
@@ -44,7 +44,7 @@ def examine_moments(step: SelectionStep, candidate: Candidate) -> Examination:
     """
     model = step.model
     (own,) = step.rows(step.scene, [candidate])
-    moments, first, place = moments_told(step)
+    moments, first, place = moments_of_blocks(step)
     rows, joints = {}, []
     for joint, item in enumerate(model.joints):
         lengths = np.diff(item.starts)

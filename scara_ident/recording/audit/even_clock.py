@@ -55,10 +55,10 @@ def even_clocks(samples: Samples) -> list[Array]:
         clocks.append(_clock(time, _interval(time, near), one, one < 1.0))
     by_positions = _by_positions(samples, usual)
     if by_positions is not None:
-        steps, told = by_positions
+        steps, determined = by_positions
         count = np.concatenate([[0.0], np.cumsum(steps)])
         over_many = (time[2 * REACH :] - time[: -2 * REACH]) / (count[2 * REACH :] - count[: -2 * REACH])
-        clocks.append(_clock(time, float(np.median(over_many)), steps, told))
+        clocks.append(_clock(time, float(np.median(over_many)), steps, determined))
     return clocks
 
 
@@ -68,7 +68,7 @@ def _midmean(values: Array) -> float:
     return float(np.mean(np.sort(values)[quarter : len(values) - quarter]))
 
 
-def _clock(time: Array, interval: float, steps: Array, told: NDArray[np.bool_]) -> Array:
+def _clock(time: Array, interval: float, steps: Array, determined: NDArray[np.bool_]) -> Array:
     """Return even times of samples so many intervals apart or, where that is not told and the stamps do, more."""
     from scipy.ndimage import median_filter, minimum_filter1d, uniform_filter1d
 
@@ -77,7 +77,7 @@ def _clock(time: Array, interval: float, steps: Array, told: NDArray[np.bool_]) 
     # Beyond its ends the recording goes on as there: so a gap behind its first sample is one.
     ahead = median_filter(ahead, 2 * LOST_REACH + 1, mode="nearest")
     # What is late for a while comes back; what is lost stays.
-    lost = _lost(minimum_filter1d(ahead, REACH, mode="nearest", origin=-(REACH // 2)), told)
+    lost = _lost(minimum_filter1d(ahead, REACH, mode="nearest", origin=-(REACH // 2)), determined)
     even = interval * (count + lost)
     # A clock that drifts is even all the same, and behind a gap it starts anew.
     edges = np.flatnonzero(np.diff(lost) >= GAP_STEPS - 1.0) + 1
@@ -96,10 +96,10 @@ def _interval(time: Array, near: float) -> float:
     return interval
 
 
-def _lost(ahead: Array, told: NDArray[np.bool_]) -> Array:
-    """Return how many samples were lost before each, by how far stamps are ahead, in intervals, where it is not `told`."""
+def _lost(ahead: Array, determined: NDArray[np.bool_]) -> Array:
+    """Return how many samples were lost before each, by how far stamps are ahead, in intervals, where it is not `determined`."""
     lost, level = np.zeros(len(ahead)), float(ahead[0])
-    total, free = 0.0, [False, *(~told).tolist()]
+    total, free = 0.0, [False, *(~determined).tolist()]
     for k, value in enumerate(ahead.tolist()):
         jump = round(value - level - total)
         if jump > 0 and free[k]:
@@ -123,7 +123,7 @@ def _by_positions(samples: Samples, usual: float) -> tuple[Array, NDArray[np.boo
     -------
     steps : ndarray, shape (N - 1,)
         The number; 1 where the joints do not tell.
-    told : ndarray of bool, shape (N - 1,)
+    determined : ndarray of bool, shape (N - 1,)
         Where they do. None is returned where they do not in most steps in which they move.
     """
     position = samples.position[~samples.idle()]
@@ -155,9 +155,9 @@ def _by_positions(samples: Samples, usual: float) -> tuple[Array, NDArray[np.boo
         none = known & (intervals < 0.5)
         if 2 * np.count_nonzero(known) < np.count_nonzero(moving) or np.mean(none[known]) > NO_WAY:
             return None
-        steps, told = np.ones(len(stamped)), np.zeros(len(stamped), dtype=bool)
+        steps, determined = np.ones(len(stamped)), np.zeros(len(stamped), dtype=bool)
         steps[inner[known]] = np.maximum(1.0, np.rint(intervals[known]))
         # Where the joints do not tell, the stamps are what is known.
-        told[inner[known]] = True
-        time = np.concatenate([[0.0], np.cumsum(np.where(told, steps * usual, stamped))])
-    return steps, told
+        determined[inner[known]] = True
+        time = np.concatenate([[0.0], np.cumsum(np.where(determined, steps * usual, stamped))])
+    return steps, determined

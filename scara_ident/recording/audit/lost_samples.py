@@ -91,10 +91,10 @@ def _missing(samples: Samples) -> tuple[Array, Array]:
             weight[j, inside] = 1.0 / max(usual, floor) ** 2
     known = np.sum(weight * way**2, axis=0)
     missing, std = np.full((2, samples.count - 1), np.nan)
-    told = (known > 0.0) & _even(samples)
+    determined = (known > 0.0) & _even(samples)
     inner = slice(SIDE - 1, samples.count - SIDE)
-    missing[inner][told] = np.sum(weight * way * jump, axis=0)[told] / known[told]
-    std[inner][told] = known[told] ** -0.5
+    missing[inner][determined] = np.sum(weight * way * jump, axis=0)[determined] / known[determined]
+    std[inner][determined] = known[determined] ** -0.5
     return missing, std
 
 

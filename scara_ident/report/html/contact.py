@@ -67,12 +67,12 @@ def _contacts(found: ContactFindings) -> list[Block]:
                 each.point_words,
             ]
         )
-    told = f"{MIN_JOINTS} joints or more" if robot.n > MIN_JOINTS else "all joints"
+    loaded = f"{MIN_JOINTS} joints or more" if robot.n > MIN_JOINTS else "all joints"
     words = (
         "Torque is the mean on the first joint while it is strong, on the side where effort is recorded. The place is the tool where a constant force "
-        f"there explains the torque of {told}, else the outermost link that is loaded: the contact is there or farther out."
+        f"there explains the torque of {loaded}, else the outermost link that is loaded: the contact is there or farther out."
     )
-    if any(each.told.point is not None for each in found.contacts):
+    if any(each.estimate.point is not None for each in found.contacts):
         words += " A force that is told beside the tool acts on a point of that link, given in its frame, as near to the tool as the torque allows."
     head = ("recording", "from [s]", "to [s]", "joints", "torque", "over threshold", "place", "force", "point [m]")
     return [Paragraph(words), Table(head, rows, (1, 2, 4, 5, 7, 8))] if rows else []

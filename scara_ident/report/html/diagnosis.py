@@ -61,12 +61,12 @@ class DiagnosisContext(FittedContext):
     """What the sections of a diagnosis draw from."""
 
     diagnosis: Diagnosis
-    told: Callable[[], Mapping[str, Any] | None] = lambda: None
+    make_worth: Callable[[], Mapping[str, Any] | None] = lambda: None
 
     @cached_property
     def worth(self) -> Mapping[str, Any] | None:
         """What the effects found cost, waited for when it is first asked for."""
-        return self.told()
+        return self.make_worth()
 
     @one_blas_thread()
     def make_ready(self) -> None:
@@ -169,7 +169,7 @@ def _effect_words(effect: FoundEffect, context: DiagnosisContext) -> list[Block]
     ]
     blocks: list[Block] = [Paragraph(words), Table(("parameter", "value", "std", "unit"), rows, (1, 2))]
     doubted = effect.held_out is not None and effect.held_out.against(context.diagnosis.search.step.criteria)
-    if not effect.size_told and not doubted:
+    if not effect.size_determined and not doubted:
         blocks.append(Paragraph("It is there by what it removes, but its size is not settled."))
     if len(found := intervals(effect, context.diagnosis)) > 1:
         blocks += [Paragraph("It acts in these intervals:"), _interval_table(found)]

@@ -49,13 +49,13 @@ def _arms(fleet: Fleet) -> list[Block]:
     rows: list[list[Cell | str]] = []
     for item in fleet.ranked:
         dates = () if item.history is None else item.history.dates
-        told = "; ".join(item.sentences)
+        joined = "; ".join(item.sentences)
         surest = min((change.p_value for change in item.changes), default=None)
         rows.append(
             [
                 name(item.arm),
                 Cell(tag=Tag(item.verdict, _MOODS.get(item.verdict, "plain"))),
-                Cell(told, "words"),
+                Cell(joined, "words"),
                 "–" if surest is None else chance(surest),
                 Cell(_diagnosis(item), "words"),
                 f"{len(dates)}",

@@ -25,7 +25,7 @@ from scara_ident.report.html.parameters import (
 from scara_ident.report.html.residual import residual_blocks
 from scara_ident.report.html.section import NamedSection, Section, notes_section
 from scara_ident.report.html.torque import error_table, torque_group
-from scara_ident.report.identification import told
+from scara_ident.report.identification import headline_and_details
 from scara_ident.report.traces import FittedContext, Trace, traces
 from scara_ident.threads import one_blas_thread
 
@@ -159,7 +159,7 @@ def identification_report(path: Path, context: IdentificationContext) -> None:
     # How runs differ has a section of its own.
     variation = identification.estimate.variation
     elsewhere = {f"{said}." for said in variation.sentences(identification.model.robot)} if variation else set()
-    first, others = told(identification)
+    first, others = headline_and_details(identification)
     verdict = (*first, _headline(identification), *(said for said in others if said not in elsewhere))
     title = f"Identification of {identification.model.robot.name}"
     Page(title, subtitle, verdict, found, bool(first or undetermined(identification))).write(path)

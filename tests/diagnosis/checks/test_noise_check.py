@@ -236,7 +236,7 @@ def test_when_friction_turns_tells_no_delay_in_the_lower_part_of_the_band(late: 
         return found[0]
 
     assert told().value[0] == pytest.approx(late, abs=1e-3)
-    monkeypatch.setattr(TimeDelay, "told_apart_from", lambda *_: ())
+    monkeypatch.setattr(TimeDelay, "distinguished_from", lambda *_: ())
     assert told().value[0] < late - 3e-3
 
 

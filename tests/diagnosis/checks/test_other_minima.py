@@ -168,11 +168,11 @@ def test_what_noise_moves_is_told_from_where_there_is_none(count: int, monkeypat
     monkeypatch.setattr(module, "physical_parameters", parameters)
     monkeypatch.setattr(module, "tune", lambda each: each)
     monkeypatch.setattr(module, "noisy", lambda *_: False)
-    monkeypatch.setattr(module, "told_size", lambda *_: True)
+    monkeypatch.setattr(module, "size_is_determined", lambda *_: True)
     monkeypatch.setattr(module, "_below", lambda _: below)
     assert quieter(step) is below
     # Not where that is noisy too, or tells not all that was found, nor where there is none.
-    for name, instead in (("noisy", True), ("told_size", False), ("_below", None)):
+    for name, instead in (("noisy", True), ("size_is_determined", False), ("_below", None)):
         with monkeypatch.context() as context:
             context.setattr(module, name, lambda *_, instead=instead: instead)
             assert quieter(step) is None

@@ -14,10 +14,10 @@ from scara_ident.diagnosis.candidates.candidates import Candidate, CandidateColu
 from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.fitting.effect_parameters import (
     Coefficients,
-    _told,
+    _physical,
     parameters_beside,
     physical_parameters,
-    told_size,
+    size_is_determined,
 )
 from scara_ident.diagnosis.fitting.nonlinear_fit import tune
 from scara_ident.diagnosis.selection.search import scene_of as scene_at
@@ -67,9 +67,9 @@ def test_what_changes_with_a_coefficient_that_is_left_open_is_not_told():
     scene, candidate = without_offset(scene_of(load_robot())), Candidate(Spring(), Member(1))
     # What a generalized inverse leaves of a coefficient that is open.
     linear = Coefficients(np.array([0.19, 0.04]), np.diag([2.5e-7, 0.0]))
-    told = _told(scene, candidate, linear, np.array([], dtype=np.intp))
+    told = _physical(scene, candidate, linear, np.array([], dtype=np.intp))
     assert told["rest_position"].std == pytest.approx(0.04 / 0.19**2 * 5e-4)
-    told = _told(scene, candidate, linear, np.array([1]))
+    told = _physical(scene, candidate, linear, np.array([1]))
     assert (told["stiffness"].std, told["rest_position"].std) == (pytest.approx(5e-4), np.inf)
 
 
@@ -116,7 +116,7 @@ def test_the_deviation_of_a_nonlinear_parameter_is_its_scatter_over_noise():
     assert told["amplitude"].std == pytest.approx(np.std(amplitude), rel=0.4)
     assert abs(told["amplitude"].value - AMPLITUDE) < 4.0 * told["amplitude"].std
     assert told["velocity"].unit == "rad/s"
-    assert (told["velocity"].told_as, told["amplitude"].told_as) == (0.0, 1.0)
+    assert (told["velocity"].even_power, told["amplitude"].even_power) == (0.0, 1.0)
 
 
 def test_several_effects_get_their_own_parameters():
@@ -198,7 +198,7 @@ def test_coefficients_are_at_least_what_their_uncertainty_leaves():
 @pytest.mark.parametrize(("std", "told"), [(0.01, True), (0.03, False)])
 def test_a_size_is_told_where_it_differs_from_none_whatever_the_other_parameters(std: float, told: bool):
     parameters = {"amplitude": Parameter(AMPLITUDE, std, "N m"), "velocity": Parameter(VELOCITY, 0.01, "rad/s")}
-    assert told_size(Stribeck(), parameters, 2.5) is told
+    assert size_is_determined(Stribeck(), parameters, 2.5) is told
 
 
 def fits(robot: Robot, runs: Sequence[Recording], chosen: Candidate, noise: Array, draws: int) -> dict[str, Array]:

@@ -190,7 +190,7 @@ def test_a_rotor_that_nobody_stated_is_told_by_the_loads_and_leaves_no_false_fri
     told = {item.joint: item for item in found.rotors}
     for name in losses:
         rotor = told[name]
-        assert rotor.told and not rotor.stated and rotor.factor is not None
+        assert rotor.determined and not rotor.stated and rotor.factor is not None
         assert abs(np.log(rotor.armature / armature)) < 2.0 * np.log(rotor.factor) < 0.3
 
 

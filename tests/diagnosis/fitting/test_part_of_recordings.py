@@ -10,7 +10,7 @@ import pytest
 
 from scara_ident.diagnosis.candidates.candidates import Candidate
 from scara_ident.diagnosis.fitting.linearised import linearise
-from scara_ident.diagnosis.fitting.part_of_recordings import ENOUGH, _told, on_all, on_part
+from scara_ident.diagnosis.fitting.part_of_recordings import ENOUGH, _strengths, on_all, on_part
 from scara_ident.diagnosis.testing.selection_step import SelectionStep
 from scara_ident.effects import Member
 from scara_ident.effects.elasticity import JointElasticity
@@ -28,10 +28,10 @@ def names(step: SelectionStep) -> list[str]:
 
 def test_no_more_recordings_than_tell_the_effects():
     step = step_beside(exact_runs(), ELASTIC)
-    part, told = on_part(step), _told(step)
+    part, told = on_part(step), _strengths(step)
     assert set(names(part)) < set(names(step))
     assert part.chosen == step.chosen
-    seconds = 48.0 * np.sum(_told(part), axis=1) / np.sum(told, axis=1)
+    seconds = 48.0 * np.sum(_strengths(part), axis=1) / np.sum(told, axis=1)
     assert np.all(seconds > 0.99 * ENOUGH)
     # Without the one of them that tells least it would be too little.
     best = np.sort(48.0 * told / np.sum(told, axis=1, keepdims=True), axis=1)[:, ::-1]
@@ -56,13 +56,13 @@ def test_those_that_tell_most_of_each_effect_are_taken(
     told: list[list[float]], taken: list[int], monkeypatch: pytest.MonkeyPatch
 ):
     step = step_beside(exact_runs(), ELASTIC)
-    monkeypatch.setattr(sys.modules[on_part.__module__], "_told", lambda _: np.array(told))
+    monkeypatch.setattr(sys.modules[on_part.__module__], "_strengths", lambda _: np.array(told))
     assert names(on_part(step)) == [names(step)[k] for k in taken]
 
 
 def test_what_a_recording_tells_is_the_weighted_square_of_the_columns():
     step = step_beside(exact_runs(), [Candidate(Spring(), Member(1))])
-    (told,) = _told(step)
+    (told,) = _strengths(step)
     each = [step.observations.data.of([k]) for k in range(4)]
     for own, data in zip(told, each, strict=True):
         alone = step_beside(data.sources, step.chosen, step.weights)

@@ -9,7 +9,7 @@ import pytest
 
 from scara_ident.diagnosis.candidates.candidates import Candidate, CandidateColumns
 from scara_ident.diagnosis.criteria import CRITERIA
-from scara_ident.diagnosis.held_out.intervals import told_by_others, words_of
+from scara_ident.diagnosis.held_out.intervals import intervals_by_others, words_of
 from scara_ident.diagnosis.testing.selection_step import SelectionStep, observed
 from scara_ident.effects import Interval, Member
 from scara_ident.effects.payload_intervals import PayloadInIntervals
@@ -34,7 +34,7 @@ def told(robots: tuple[Robot, Robot], held_out: Recording) -> tuple[tuple[Interv
     after = wls(observed(step))
     _, one = seen(robots[0], [held_out])
     scene = replace(scene, start={**scene.start, held_out.name: float(held_out.time[0])})
-    return told_by_others(one, scene, chosen, 0, after.value, after.weights)
+    return intervals_by_others(one, scene, chosen, 0, after.value, after.weights)
 
 
 def test_each_joint_is_told_by_the_others(robots: tuple[Robot, Robot]):

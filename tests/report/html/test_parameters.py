@@ -45,7 +45,7 @@ def test_what_cancels_in_the_urdf_is_0_and_no_rounding(result, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("std", "told_as", "shown"),
+    ("std", "even_power", "shown"),
     [
         (150.0, -1.0, "1.5e+02"),
         (1504.0, -1.0, "2160 to 17700 (95 %)"),
@@ -54,5 +54,7 @@ def test_what_cancels_in_the_urdf_is_0_and_no_rounding(result, monkeypatch):
         (np.inf, 1.0, "not told"),
     ],
 )
-def test_the_table_has_the_interval_where_a_standard_deviation_says_too_little(std: float, told_as: float, shown: str):
-    assert unsure(Parameter(3845.0, std, "N m/rad", told_as)) == shown
+def test_the_table_has_the_interval_where_a_standard_deviation_says_too_little(
+    std: float, even_power: float, shown: str
+):
+    assert unsure(Parameter(3845.0, std, "N m/rad", even_power)) == shown

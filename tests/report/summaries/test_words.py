@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from scara_ident.report.told.words import in_units, number, table, text_of
+from scara_ident.report.summaries.words import in_units, number, table, text_of
 
 
 def test_text_is_plain_and_keeps_brackets():

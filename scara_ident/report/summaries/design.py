@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from scara_ident.excitation.design import Design
 from scara_ident.excitation.output import RATE, excitation_dict, trajectory_columns
-from scara_ident.report.told.words import table, text_of
+from scara_ident.report.summaries.words import table, text_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -16,7 +16,7 @@ from scara_ident.estimation.observations import observe
 from scara_ident.estimation.run_offsets import offsets_on, rms_of
 
 
-def told_in(found: Search, step: SelectionStep) -> Search:
+def in_bands_of(found: Search, step: SelectionStep) -> Search:
     """Return a search with all that it tells fitted and judged in the bands of a step; what stayed and what did not is as it was.
 
     Parameters

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from scara_ident.report.told import recording
-from scara_ident.report.told.words import text_of
+from scara_ident.report.summaries import recording
+from scara_ident.report.summaries.words import text_of
 from scara_ident.simulation.simulate import SimulationResult
 
 if TYPE_CHECKING:

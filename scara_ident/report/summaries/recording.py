@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from scara_ident.recording.columns import recording_columns
 from scara_ident.recording.recording import Recording
 from scara_ident.report.plot import Line, Panel, Plot, single, style
-from scara_ident.report.told.words import table, text_of
+from scara_ident.report.summaries.words import table, text_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -10,7 +10,7 @@ from scara_ident.manners import several
 from scara_ident.report.diagnosis import beyond_chance, diagnosis_dict
 from scara_ident.report.doubts import parted
 from scara_ident.report.left_out import left_out_words
-from scara_ident.report.told.words import in_units, table, text_of
+from scara_ident.report.summaries.words import in_units, table, text_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

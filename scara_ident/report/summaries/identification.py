@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from scara_ident.identification.identify import Identification
-from scara_ident.report.identification import identification_dict, told
-from scara_ident.report.told import estimate
-from scara_ident.report.told.words import in_units, table, text_of
+from scara_ident.report.identification import headline_and_details, identification_dict
+from scara_ident.report.summaries import estimate
+from scara_ident.report.summaries.words import in_units, table, text_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -20,7 +20,7 @@ content = identification_dict
 def summary(identification: Identification) -> str:
     """Return what questions the result, parameters, errors and bands as tables, and the result in sentences."""
     notes = [f"note: {note}" for note in identification.notes]
-    first, others = told(identification)
+    first, others = headline_and_details(identification)
     return text_of(*first, *notes, *tables(identification), bands_said(identification), *others)
 
 

@@ -10,7 +10,7 @@ from scara_ident.estimation.estimate import Estimate
 from scara_ident.estimation.saved import estimate_dict
 from scara_ident.model.urdf_values import urdf_values
 from scara_ident.report.plot import Dots, Panel, Plot, single
-from scara_ident.report.told.words import number, table, text_of
+from scara_ident.report.summaries.words import number, table, text_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -64,8 +64,8 @@ def parameter_table(estimate: Estimate) -> Table:
     """Return name, value, standard deviation, the URDF's value, unit and meaning of every parameter."""
     right = ("value", "std", "URDF")
     rows = table(title(estimate), "name", *right, "unit", "meaning", right=right)
-    told = zip(estimate.model.columns, estimate.value, estimate.std, urdf_values(estimate.model), strict=True)
-    for column, value, std, stated in told:
+    table_rows = zip(estimate.model.columns, estimate.value, estimate.std, urdf_values(estimate.model), strict=True)
+    for column, value, std, stated in table_rows:
         urdf = "-" if np.isnan(stated) else f"{stated:.4g}"
         rows.add_row(column.name, number(value, std), f"{std:.2g}", urdf, column.unit, column.meaning)
     return rows

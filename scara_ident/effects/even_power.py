@@ -48,5 +48,5 @@ def interval(value: float, std: float, power: float) -> tuple[float, float] | No
     low, high = (changed(value, way, power) for way in (-reach, reach))
     if max(abs(low - (value - reach)), abs(high - (value + reach))) < NOTICEABLE * std:
         return None
-    told = power < 0.0 or low > value / FARTHEST
-    return (low if told else -np.inf), (high if high < value * FARTHEST else np.inf)
+    bounded = power < 0.0 or low > value / FARTHEST
+    return (low if bounded else -np.inf), (high if high < value * FARTHEST else np.inf)

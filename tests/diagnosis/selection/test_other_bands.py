@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from scara_ident.diagnosis.candidates.candidates import columns_at_hand
+from scara_ident.diagnosis.selection.other_bands import in_bands_of
 from scara_ident.diagnosis.selection.search import Search
-from scara_ident.diagnosis.selection.told_in import told_in
 from scara_ident.diagnosis.testing.selection_step import observed
 from scara_ident.effects.friction import Stribeck
 from scara_ident.effects.measurement import TimeDelay, shifted
@@ -31,7 +31,7 @@ def sprung_runs(late: float = 0.0) -> list[Recording]:
 def moved(found: Search) -> Search:
     columns = found.step.columns.at(LOWER)
     scene = replace(found.scene, band=max(LOWER), columns=columns_at_hand(columns.observations))
-    return told_in(found, replace(found.step, scene=scene, columns=columns))
+    return in_bands_of(found, replace(found.step, scene=scene, columns=columns))
 
 
 def test_all_of_it_is_of_the_other_bands() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from scara_ident.identification.compare import Comparison
 from scara_ident.report.comparison import comparison_dict
 from scara_ident.report.plot import Dots, Panel, Plot, single, style
-from scara_ident.report.told.words import table, text_of
+from scara_ident.report.summaries.words import table, text_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
