@@ -293,7 +293,7 @@ def stand_ins(robot: Robot, runs: Sequence[Recording], name: str, effect: FoundE
     return f"**Taken for:** {', '.join(labels)}, which removes {removes}; the verdict is then `{found.verdict}`."
 
 
-def told_of(name: str, robot: Robot, runs: Sequence[Recording], hidden: str, effect: FoundEffect) -> str:
+def computed_of(name: str, robot: Robot, runs: Sequence[Recording], hidden: str, effect: FoundEffect) -> str:
     """Return what the page says of an effect that was computed."""
     return f"{here(effect, hidden)}\n\n{stand_ins(robot, runs, name, effect)}"
 
@@ -353,7 +353,7 @@ def main(wanted: Sequence[str]) -> None:
         print(name, diagnosis.verdict, *(item.label for item in diagnosis.effects), flush=True)
         effect, told = figure(diagnosis, name)
         draw(PICTURES / f"{name}.png", told)
-        computed[name] = told_of(name, robot, runs, hidden, effect)
+        computed[name] = computed_of(name, robot, runs, hidden, effect)
         PAGE.write_text(page(computed), encoding="utf-8")
     PAGE.write_text(page(computed), encoding="utf-8")
 

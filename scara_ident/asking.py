@@ -129,7 +129,7 @@ def ask(folder: Path, settings: Settings, work: Work | None = None) -> Asked:
         With ``recordings``; gets ``diagnosis.json``, ``report.html``, ``next`` and ``ask.json``.
     settings : Settings
     work : Work, optional
-        Told every step that begins.
+        Called with every step that begins.
 
     Returns
     -------

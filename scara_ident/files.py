@@ -26,7 +26,7 @@ from scara_ident.errors import ScaraIdentError, UsageError
 PROBE = 4096
 # Bytes of a name out of a file; file systems take 255 with what is put before and behind it.
 LONGEST_SLUG = 200
-# What is still being written: whose it is, so that what a killed run has left can be told from what another run writes.
+# What is still being written: whose it is, so that what a killed run has left can be distinguished from what another run writes.
 UNFINISHED = ".scara-ident"
 _KINDS = (
     (stat.S_ISFIFO, "a named pipe"),

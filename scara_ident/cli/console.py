@@ -102,7 +102,7 @@ def progress() -> Iterator[Work]:
 
 @contextmanager
 def writing(folder: Path) -> Iterator[tuple[Path, Work]]:
-    """Write results whole or not at all, see `written_together`; yields their place, and who is told of each."""
+    """Write results whole or not at all, see `written_together`; yields their place, and whoever is notified of each."""
     from scara_ident.files import written_together
 
     with progress() as work, written_together(folder) as place:

@@ -11,7 +11,7 @@ import typer
 from scara_ident.cli import options
 from scara_ident.cli.console import output_console
 
-# What the arm has and the identifier is not told.
+# What the arm has and the identifier does not know.
 HIDDEN = "transmission_loss:joint2:loss_coefficient=0.2"
 # Folders of the chapters' results.
 PARTS = (

@@ -86,7 +86,7 @@ class SelectionCriteria:
     )
     highest_order: float = _criterion(13.0, "1 / motor turn", "gears and motors have orders up to 12")
     min_line_periods: float = _criterion(
-        6.0, "periods in a recording", "a slower line in time is not told from the motion's own harmonics"
+        6.0, "periods in a recording", "a slower line in time is not distinguished from the motion's own harmonics"
     )
     # Searching.
     max_effects: int = _criterion(
@@ -116,7 +116,7 @@ class SelectionCriteria:
     lower_band: float = _criterion(
         0.35,
         "of the band",
-        "in which what is the same at all frequencies is looked for again, and what each recording has of its own is told; half-way to it by octaves what noise could make, and parameters of effects that act together",
+        "in which what is the same at all frequencies is looked for again, and what each recording has of its own is estimated; half-way to it by octaves what noise could make, and parameters of effects that act together",
     )
     lower_change: float = _criterion(
         0.5,

@@ -57,8 +57,8 @@ from scara_ident.threads import one_blas_thread
 _LOG = logging.getLogger(__name__)
 # Dependences that are handed on: further ones are pairs that only repeat the first.
 NAMED_DEPENDENCES = 12
-# Said where effects are told in a lower band than they were found in.
-QUIETER = "all is told below {:.2g} Hz: up to {:.2g} Hz, where it was found, the noise of the positions moves it by more than chance"
+# Said where effects are estimated in a lower band than they were found in.
+QUIETER = "all is estimated below {:.2g} Hz: up to {:.2g} Hz, where it was found, the noise of the positions moves it by more than chance"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -305,13 +305,13 @@ def diagnose(
 
 
 def _whole(outcome: Outcome) -> SelectionStep:
-    """Return the step that all parameters of an outcome are told by."""
+    """Return the step that all parameters of an outcome are estimated by."""
     found, after = outcome.search, outcome.after
     return replace(found.whole(replace(found.step, weights=after.weights)), variation=after.offsets)
 
 
 def _where_searched(outcome: Outcome, held_out: PreparedData) -> tuple[Outcome, Validation]:
-    """Return an outcome that is told in other bands at the whole estimate in its own, and what recordings held out say of that.
+    """Return an outcome that is estimated in other bands at the whole estimate in its own, and what recordings held out say of that.
 
     Whether what is left is noise is asked where most of it is seen, by what leaves the least there.
     """

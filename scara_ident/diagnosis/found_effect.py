@@ -41,7 +41,7 @@ class FoundEffect:
         What it changes on recordings that no choice has seen; None where there are none in which it acts.
     size_determined : bool
         Whether its size differs from none with all that is unsure about it, such as the law that it follows. That it is
-        there is told by what it removes, whatever that law.
+        there is shown by what it removes, whatever that law.
     """
 
     effect: str
@@ -114,14 +114,14 @@ def found_effects(
     readings: Readings,
     held_out: Mapping[str, HeldOutGain],
 ) -> list[FoundEffect]:
-    """Return the effects that came in, in that order, with their parameters and what cannot be told from them.
+    """Return the effects that came in, in that order, with their parameters and what cannot be distinguished from them.
 
     What was taken out of the data in several steps is one effect, as it came in first.
 
     Parameters
     ----------
     groups : sequence of tuple of Confounder
-        What cannot be told from each effect in the model, see `confounders`.
+        What cannot be distinguished from each effect in the model, see `confounders`.
     """
     scene = found.scene
     labels = [item.label(scene) for item in found.chosen]

@@ -37,7 +37,7 @@ TOO_LITTLE = "{0.label} would remove {0.gain:.0%} of what is left, but the recor
 
 
 def select_model(task: SearchTask, observations: Observations, *, free: bool) -> Outcome:
-    """Search for what a model lacks in the band where that can be told.
+    """Search for what a model lacks in the band where that can be determined.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def select_model(task: SearchTask, observations: Observations, *, free: bool) ->
 
 
 def below_position_noise(task: SearchTask, outcome: Outcome) -> Outcome:
-    """Return what a search leaves, told from the lower part of the band where the noise of positions moves what was found.
+    """Return what a search leaves, estimated in the lower part of the band where the noise of positions moves what was found.
 
     Effects that act together tell so, see `quieter`, and all that was fitted with them moves too. As it was where something is left
     over, or an effect does not stand there.

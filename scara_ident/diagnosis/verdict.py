@@ -33,9 +33,9 @@ def weighed_evidence(
 ) -> tuple[Evidence, ...]:
     """Return for each joint whether what is left was shown to be noise, and by what.
 
-    Every witness that may speak against it is asked in turn, and the first that does is the one that is told: what the search
+    Every witness that may speak against it is asked in turn, and the first that does is the one that is reported: what the search
     left open, what is left of the training recordings, lines in it, one of them beside all others, its parts beside each other,
-    what comes late in all, those held out, and there each effect. Friction that pushes is told whatever they say.
+    what comes late in all, those held out, and there each effect. Friction that pushes is reported whatever they say.
 
     Parameters
     ----------

@@ -81,7 +81,7 @@ class Effect(ABC):
     same_at_all_frequencies : bool
         Whether its coefficient is the same in any part of the band, so that another one there says that it is not it.
     in_small_ways : bool
-        Whether it is told by how positions differ by little, as setpoints do from what a controller makes of them.
+        Whether it is determined by small differences of positions, as setpoints do from what a controller makes of them.
     of_state : bool
         Whether the columns at a sample follow from position, velocity and acceleration there, by numpy's arithmetic, sin,
         cos, exp, abs and sign alone, so that code for a controller can have them.
@@ -392,7 +392,7 @@ class Effect(ABC):
         return None
 
     def distinguished_from(self, scene: Scene, member: Member) -> tuple[tuple[Effect, Member], ...]:
-        """Return what is no part of an arm and may look like it in the lower part of the band, beside which it is told there."""
+        """Return what is no part of an arm and may look like it in the lower part of the band, beside which it is estimated there."""
         return ()
 
     def leaves(self, scene: Scene, member: Member, value: Array) -> tuple[Effect, Member, float] | None:

@@ -27,12 +27,12 @@ LOWEST_FREQUENCY, HIGHEST_FREQUENCY = 2.0, 200.0
 # Damping ratio of that swinging. Gears have 0.03 to 0.1, but then the phase after a few swings depends on inertia and
 # stiffness to the percent; the search begins with more, so that what the link does follows from the torque of the last swing.
 DAMPING = 0.2
-# Damping ratios that the fit may reach: above it does not swing. Those of gears are told with the motor free, whose swinging is
+# Damping ratios that the fit may reach: above it does not swing. Those of gears are estimated with the motor free, whose swinging is
 # faster: behind a motor that is held the ratio is smaller by the root of the rotor's share of both inertias.
 LOWEST_DAMPING, HIGHEST_DAMPING = 0.01, 0.7
 # Of the highest damping ratio and frequency, at which a fit has gone as far as it may.
 AS_FAR_AS_MAY_BE = 0.999
-# A resonance is told from a softer gear by what is above it: the band reaches so many times its frequency.
+# A resonance is distinguished from a softer gear by what is above it: the band reaches so many times its frequency.
 BOTH_SIDES = 1.5
 # Links that share less of their inertia hardly swing together.
 MIN_COUPLING = 0.2
@@ -206,7 +206,7 @@ class JointElasticity(BehindGear):
     def with_even_powers(self, parameters: Mapping[str, Parameter]) -> Mapping[str, Parameter]:
         """Say of the stiffness how much of what is unsure of it is the frequency, and not the inertia that goes with this.
 
-        The stiffness follows the inertia, and its reciprocal what the frequency is told as.
+        The stiffness follows the inertia, and its reciprocal the even power of the frequency.
         """
         stiffness, frequency = parameters["stiffness"], parameters["frequency"]
         if not 0.0 < stiffness.std < np.inf:

@@ -2,7 +2,7 @@
 
 Of a gear too stiff to be seen swinging the torque tells the compliance, of which the stiffness is the power -1: where the compliance
 may be all but nothing, the stiffness has no upper end. A power of 1 is the parameter itself, 0 its logarithm, as of a distance that
-is told to a factor; a parameter that is partly of one and partly of another kind has one between (Box and Cox 1964).
+is known to a factor; a parameter that is partly of one and partly of another kind has one between (Box and Cox 1964).
 """
 
 from __future__ import annotations
@@ -11,10 +11,10 @@ import numpy as np
 
 # The span of an interval, 95 %.
 INTERVAL_STDS = 2.0
-# An interval is told where an end of it is so many standard deviations from that of the value ± these: less is lost in the digit
+# An interval is reported where an end of it is so many standard deviations from that of the value ± these: less is lost in the digit
 # that a standard deviation is written with.
 NOTICEABLE = 0.5
-# An end that is a larger factor from the value says nothing, but for the lower one of what is told by its reciprocal: that is how
+# An end that is a larger factor from the value says nothing, but for the lower one of what is even in its reciprocal: that is how
 # large this may be.
 FARTHEST = 100.0
 # Logarithm that no factor exceeds: more is infinite.
@@ -22,9 +22,9 @@ LARGEST_LOG = 700.0
 
 
 def changed(value: float, way: float, power: float) -> float:
-    """Return the value so far from one, evenly in what is told, in units of the parameter there.
+    """Return the value so far from one, evenly in that power, in units of the parameter there.
 
-    None, or infinite, where what is told has changed its sign before.
+    None, or infinite, where the power has changed its sign before.
     """
     share = way / value
     if power != 0.0:
@@ -40,7 +40,7 @@ def interval(value: float, std: float, power: float) -> tuple[float, float] | No
     Parameters
     ----------
     std : float
-        Of the parameter at its value, as what is told makes it to first order.
+        Of the parameter at its value, to first order.
     """
     if power == 1.0 or not (0.0 < std < np.inf and 0.0 < value < np.inf):
         return None

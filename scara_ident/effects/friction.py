@@ -179,7 +179,7 @@ class Stribeck(AtLowSpeed):
 class AsymmetricFriction(Effect):
     """Viscous friction that differs by direction of the drive: ``u = viscous_difference/2 |v|``.
 
-    Coulomb friction that differs by direction cannot be told from the torque offset.
+    Coulomb friction that differs by direction cannot be distinguished from the torque offset.
     """
 
     name = "asymmetric_friction"

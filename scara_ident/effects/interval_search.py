@@ -1,4 +1,4 @@
-"""In which intervals of recordings the last link carries a body, told by the torque alone, and what it is.
+"""In which intervals of recordings the last link carries a body, by the torque alone, and what it is.
 
 One body, in any number of intervals of any recordings, beside the base model that all share and offsets of each recording's
 own. Where the body is known, each cell of time says by how much the torque is likelier with it than without, and the
@@ -33,7 +33,7 @@ OF_NOISE = 0.03
 ROUNDS = 20
 # Nobody takes something up for less than this, s.
 SHORTEST = 0.3
-# Directions of a body's columns of unit size below this share are not told.
+# Directions of a body's columns of unit size below this share are not identifiable.
 _RANK = 1e-6
 
 
@@ -76,7 +76,7 @@ def carried(scene: Scene, shown: Sequence[int]) -> tuple[Interval, ...]:
     scene : Scene
         With the base model's columns on motions that carry the recorded torque.
     shown : sequence of int
-        Standard parameters of a body on the last link, of which it is told.
+        Standard parameters of a body on the last link, by which it is identified.
     """
     if not scene.columns:
         return ()

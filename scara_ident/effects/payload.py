@@ -31,7 +31,7 @@ INSTANTS_FREE = 4
 FREE_COLUMNS = 4
 # A further one must add this share of the torque of the first, or it is noise that is fitted.
 FREE_COLUMN_SHARE = 0.02
-# Of a payload through whole recordings all is told that is more than rounding.
+# Of a payload through whole recordings all is identified that is more than rounding.
 BODY_COLUMNS, BODY_COLUMN_SHARE = 10, 1e-3
 # Masses and moments of inertia are seen to be there this many standard deviations from none: 0.3 % two-sided.
 SEEN_STDS = 3.0
@@ -148,7 +148,7 @@ class FreePayloadChange(PayloadChange):
 class PayloadOfRecordings(Effect):
     """A body that the last link carries in some recordings and not in others, mounted anyhow.
 
-    The recordings are told by their torque, see `groups_by_torque`; their group is a member's partner, a bit for each
+    The recordings are grouped by their torque, see `groups_by_torque`; their group is a member's partner, a bit for each
     recording in the order of the scene. Where all have the same payload the base model absorbs it, and nothing but a known
     mass can tell it.
 
@@ -229,7 +229,7 @@ class PayloadOfRecordings(Effect):
         return slice(0, 1) if self._determined(scene.robot)[0] == 0 else slice(None)
 
     def parameters(self, scene: Scene, member: Member, value: Array, covariance: Array) -> Mapping[str, Parameter]:
-        """Return mass and centre of mass where they can be told, and the body's standard parameters."""
+        """Return mass and centre of mass where they can be determined, and the body's standard parameters."""
         shown = self._determined(scene.robot)
         plain = super().parameters(scene, member, value, covariance).values()
         found = {"mass" if k == 0 else BODY_PARAMETERS[k]: item for k, item in zip(shown, plain, strict=True)}

@@ -23,7 +23,7 @@ MAX_SENTENCES = 3
 class PayloadInIntervals(FreePayloadChange):
     """One body that the last link carries in intervals of recordings, mounted anyhow.
 
-    The intervals are told by the torque, see `carried`. Where the arm rests about an instant it is known as badly as that
+    The intervals follow from the torque, see `carried`. Where the arm rests about an instant it is known as badly as that
     lasts.
     """
 

@@ -23,7 +23,7 @@ from scara_ident.model.terms import Column, joint_rows
 ORDERS = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 12.0)
 # Orders of an encoder's error: an eccentric disc has one period per turn, an oval one two.
 ENCODER_ORDERS = (1.0, 2.0)
-# Periods that the travel, or the longest recording, must hold for sine and cosine to be told from a slope.
+# Periods that the travel, or the longest recording, must hold for sine and cosine to be distinguished from a slope.
 PERIODS_COVERED = 2.0
 # Share of the joint's largest speed at which an order must lie within the band: a joint is hardly ever slower for long.
 SLOW_SHARE = 0.03

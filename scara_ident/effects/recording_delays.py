@@ -27,7 +27,7 @@ class DelayOfEachRecording(TimeDelay):
     Clocks that are started anew for each recording, or a logger that waits, make such delays. One of all recordings is their
     mean, and what is left then looks like elastic gears. They come in where the joints agree that the recordings differ,
     see `scara_ident.estimation.shared_delays`, and are corrected as that of all is; a held-out recording tells its own by its first part.
-    Each is told in the lower part of the band: where a controller damps by differences of coarse positions, their noise in the
+    Each is estimated in the lower part of the band: where a controller damps by differences of coarse positions, their noise in the
     torque and in the column make one of milliseconds in a recording that moves little.
 
     When friction turns is left to no column: samples of a jump are up to half an interval off, and friction that builds up over a

@@ -24,7 +24,7 @@ from scara_ident.motion.prepared import PreparedRecording, PreparedStretch
 
 # Share of a stretch's samples that the second encoder must have.
 KNOWN = 0.99
-# A stiffness is told from this many standard deviations, where noise is at most this share of the lag's square, and the torque
+# A stiffness is significant from this many standard deviations, where noise is at most this share of the lag's square, and the torque
 # that the gear passes on explains this share of it, which that of a clearance does not.
 MIN_STDS, MAX_NOISE, MIN_EXPLAINED = 5.0, 0.02, 0.8
 

@@ -59,7 +59,7 @@ class Scene:
     start : Mapping[str, float]
         Time of the first sample of every recording, s.
     armatures : Mapping[int, float]
-        Armature N^2 Jm of joints (by place) where the base model cannot tell it: as an effect told it, or guessed within
+        Armature N^2 Jm of joints (by place) where the base model cannot determine it: as an effect does, or guessed within
         what the estimate leaves room for; nominal for the others.
     columns : Mapping[Motion, tuple of ndarray]
         The base model's columns on motions where they are at hand, see `TorqueModel.joint_columns`.

@@ -156,7 +156,7 @@ class BaseTilt(_Tilt):
     """Gravity's components -g tilt_x and -g tilt_y along the base's x and y axes; of one that hangs or leans, across gravity.
 
     What they do to parameters that the model estimates anyway tells the tilt. On an arm with vertical axes they also
-    bring in first moments that no motion told before (of the first link, and of all that it carries); these have
+    bring in first moments that no motion determined before (of the first link, and of all that it carries); these have
     columns of their own, whose coefficients are tilt times first moment. If they point where the URDF's first moments
     say, they take part in the estimate of the tilt; a position torque of one joint, such as a spring, gives a tilt of
     zero beside such coefficients.
@@ -167,7 +167,7 @@ class BaseTilt(_Tilt):
         return (Member(None),) if _gravity(scene.model.rigid_body).known_axes else ()
 
     def columns(self, scene: Scene, member: Member) -> tuple[Column, ...]:
-        """Tilt about each axis that can be told, then what enters newly."""
+        """Tilt about each axis that can be identified, then what enters newly."""
         gravity = _gravity(scene.model.rigid_body)
         tilts = (_tilt_column(scene.robot, axis) for axis in gravity.known_axes)
         units = (_moment_unit(scene.robot, gravity.entering[:, k]) for k in range(len(gravity.entering_axes)))

@@ -212,7 +212,7 @@ def _pooled(joints: Sequence[_Scores], root: Array, owner: NDArray[np.intp]) -> 
 
 
 def _within_rows(joint: _Scores) -> tuple[Array, Array]:
-    """Return scores and products in directions that rows fix no more than wholly: where some are hardly told, rounding has leverages above 1."""
+    """Return scores and products in directions that rows fix no more than wholly: where some are hardly determined, rounding has leverages above 1."""
     total = np.sum(joint.products, axis=0)
     # Of leverages up to 1 the squares are no more than they are.
     if np.sum(total**2) <= ROUNDED * np.trace(total):

@@ -104,7 +104,7 @@ class _Fit:
     value : ndarray, shape (p,)
     undetermined : ndarray of bool, shape (p,)
     inverse : ndarray, shape (p, p)
-        Of ``W.T @ W`` of all weighted rows, within the directions that are told.
+        Of ``W.T @ W`` of all weighted rows, within the directions that are determined.
     """
 
     weights: Array
@@ -174,7 +174,7 @@ def least_squares(
     differing = variation if least is None else larger_offsets(variation.offsets, least) or least
     covariance = spread.matrix + differing.covariance(fit.inverse, rows.influence.joints, fit.weights)
     if len(observations.data.recordings) < MIN_RUNS:
-        # What else two runs might differ by is not told.
+        # What else two runs might differ by is not determined.
         variation = variation.offsets or RunVariation((None,) * len(observations.joints))
     bias = None
     if fit.directions is not None:

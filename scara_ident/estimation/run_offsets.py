@@ -44,7 +44,7 @@ class OffsetRows:
     def taken(self, inverse: Array, weights: Array) -> Array:
         """Return how many of the runs' offsets a fit takes up on each joint, shape (n,): the leverage of all of them.
 
-        One where runs are alike, which is their mean; more where poses differ and gravity is told by means of runs.
+        One where runs are alike, which is their mean; more where poses differ and gravity is determined by means of runs.
 
         Parameters
         ----------

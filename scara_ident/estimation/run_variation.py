@@ -38,7 +38,7 @@ LIKE_DELAY = "like a delay"
 # As each is called where it differs.
 _DIFFERING = (*(f"its {kind}" for kind in KINDS[:DELAY]), "what looks like a delay, which the joints do not share,")
 
-# With fewer recordings than this none can be told from the parameters.
+# With fewer recordings than this none can be distinguished from the parameters.
 MIN_RUNS = 3
 # Of differences below this share of the torque nothing is said in words.
 SPOKEN_OF = 0.01

@@ -15,7 +15,7 @@ from scara_ident.model.urdf_torque import urdf_torques
 
 # Gravity of less than this share of the stated one is none: a controller subtracts it as well as it knows masses.
 NONE = 0.15
-# Another direction is told where it leaves at most this share of the rms that the stated one leaves, over all joints, each in
+# Another direction is reported where it leaves at most this share of the rms that the stated one leaves, over all joints, each in
 # units of what it leaves where gravity and inertia are free for it alone; rough masses leave as much along any direction.
 FAR_LESS = 0.5
 # A base that leans by less than this, degrees, may stand so in truth; that is an effect, and is looked for as one.
@@ -100,7 +100,7 @@ class UrdfGravity:
 
     @property
     def _as_heavy(self) -> bool:
-        """Whether inertia is told, and about that of the URDF."""
+        """Whether inertia is determined, and about that of the URDF."""
         return 1.0 / USUAL < self.inertia < USUAL and self.inertia > SURE * self.inertia_std
 
 
@@ -221,7 +221,7 @@ def _outside(columns: Array, signals: Array) -> Array:
 
 
 def _solved(columns: Array, torque: Array, rows: int) -> tuple[Array, Array, float]:
-    """Return least-squares values, their covariance, infinite where some are not told, and the rms over so many rows of what is left."""
+    """Return least-squares values, their covariance, infinite where some are not determined, and the rms over so many rows of what is left."""
     size = np.linalg.norm(columns, axis=0)
     scale = 1.0 / np.where(size > 0.0, size, 1.0)
     value, _, rank, _ = np.linalg.lstsq(columns * scale, torque, rcond=1e-6)

@@ -17,7 +17,7 @@ from scara_ident.robot.robot import Robot
 
 # The URDF's torque tells the scale of a joint where it leaves less than this share of the identified bodies' torque.
 MAX_UNEXPLAINED = 0.5
-# A scale is told where it is so many of its standard deviations.
+# A scale is significant where it is so many of its standard deviations.
 SURE = 5.0
 # Torques of gravity below this, N m for each kg, are rounding.
 ROUNDING = 1e-9
@@ -38,9 +38,9 @@ class JointScale:
     scale : float
         The first as a multiple of the second.
     significant : bool
-        Whether the scale is told from zero.
+        Whether the scale differs significantly from zero.
     sure : bool
-        Whether what is left is told from zero.
+        Whether what is left differs significantly from zero.
     left : float
         Share of the identified torque that the URDF's does not explain in any scale.
     torque, nominal : float
@@ -64,7 +64,7 @@ def urdf_scale(estimate: Estimate, observations: Observations) -> dict[str, floa
     Returns
     -------
     dict of str to float
-        By joint, negative where the signs are opposite; without those where it is not told from zero, or the identified
+        By joint, negative where the signs are opposite; without those where it is not significant, or the identified
         torque is not that of the URDF in any scale.
     """
     each = joint_scales(estimate, observations)
@@ -81,7 +81,7 @@ def joint_scales(estimate: Estimate, observations: Observations) -> dict[str, Jo
     """Compare the torque of the identified bodies with that of the URDF's on each joint where these take any."""
     model = observations.model
     stated = urdf_values(model)
-    # What has no finite variance is not told, though the estimate may have a value for it.
+    # What has no finite variance is not determined, though the estimate may have a value for it.
     known = np.isfinite(stated) & ~estimate.undetermined & np.isfinite(estimate.std)
     found = {}
     for joint, rows in zip(model.robot.joints, observations.joints, strict=True):

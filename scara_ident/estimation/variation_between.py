@@ -58,7 +58,7 @@ def run_variation(
         How many of the runs' offsets on each joint the parameters take up, see `scara_ident.estimation.run_offsets`; by
         default their mean.
     of_two : bool, optional
-        Whether the offsets of two runs are told too: by two, other differences may be the parameters'.
+        Whether the offsets of two runs are estimated too: by two, other differences may be the parameters'.
     """
     runs = len(observations.data.recordings)
     if runs < (2 if of_two else MIN_RUNS):

@@ -80,8 +80,8 @@ def determined_directions(observations: Observations, noise: Array) -> Determine
 
     Returns
     -------
-    Told or None
-        None where all is told that can be, or for a model with terms that are no function of the state.
+    DeterminedDirections or None
+        None where all is determined that can be, or for a model with terms that are no function of the state.
     """
     range_ = _range_factor(observations)
     if range_ is None:
@@ -120,7 +120,7 @@ def believable(observations: Observations, value: Array, noise: Array) -> Array:
     Returns
     -------
     ndarray, shape (p,)
-        The estimate itself where all of it is told, and for a model with terms that are no function of the state.
+        The estimate itself where all of it is determined, and for a model with terms that are no function of the state.
     """
     range_ = _range_rows(observations)
     if range_ is None:

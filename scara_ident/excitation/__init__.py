@@ -1,4 +1,4 @@
-"""Excitation: the motion from which the parameters of a model can be told best, within the limits of the robot."""
+"""Excitation: the motion from which the parameters of a model can be determined best, within the limits of the robot."""
 
 from scara_ident.excitation.criteria import BlockLogDet, Condition, Criterion, LogDet, block_of
 from scara_ident.excitation.curves import Basis, ExcitationTrajectory, make_basis

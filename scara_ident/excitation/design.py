@@ -1,4 +1,4 @@
-"""Design of excitation: the trajectory from which the parameters of a model can be told best."""
+"""Design of excitation: the trajectory from which the parameters of a model can be determined best."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class Design(Saved, reported_by="design"):
     effort : Effort
     seconds : float
         What the search took.
-    tells : tuple of Told
+    tells : tuple of ExpectedAnswer
         Where it was designed to answer questions, what it tells of each.
     """
 

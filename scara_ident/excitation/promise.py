@@ -197,7 +197,7 @@ def rows_in_blocks(inquiry: Inquiry, motion: Motion) -> tuple[Blocks, tuple[floa
 
     Notes
     -----
-    A period of a signal within a band is told by as many equal steps as it has Fourier coefficients there, and by
+    A period of a signal within a band is determined by as many equal steps as it has Fourier coefficients there, and by
     Parseval's theorem their squares are those of all samples; white noise is then as large in any of them.
     """
     signals = Signals(inquiry.scene, motion)

@@ -266,7 +266,7 @@ def _tightest(problem: Problem, seed: int) -> str:
 
 
 def _never_distinguished(task: Task) -> list[str]:
-    """Return the parameters of combinations that the regressor of no state shows, and that nobody told."""
+    """Return the parameters of combinations that the regressor of no state shows, and that nobody gave."""
     model, limits = task.smooth.model, task.limits
     random = np.random.default_rng(0)
     count = max(60, 4 * len(model.names))

@@ -209,7 +209,7 @@ def _adjustable(form: Form, found: IdentifiedModel) -> tuple[NDArray[np.intp], A
     """Return the places of friction and offset that the format has, and what they may not fall below.
 
     Of friction that the recordings leave open nothing is said. An offset that they leave open beside the bodies, as on an
-    axis that goes up and down, is told once those are what is written.
+    axis that goes up and down, is determined once those are what is written.
     """
     places: list[int] = []
     lower: list[float] = []

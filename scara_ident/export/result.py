@@ -128,7 +128,7 @@ def _model_of(
 
 
 def _rms(content: Mapping[str, Any], joints: Sequence[str]) -> Array:
-    """Return the rms error over the recordings held out, else over those fitted, all counted alike; NaN where none is told."""
+    """Return the rms error over the recordings held out, else over those fitted, all counted alike; NaN where none is given."""
     for kind in ("validation", "training"):
         # Of a diagnosis, where what was not held out has no errors.
         whole = (content.get(kind) or {}).get("after_unfiltered")

@@ -24,7 +24,7 @@ REPORTED_RUN_KINDS = np.array([[1, 0, 0, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 
 # Friction of these powers of speed is also looked at alone; of higher ones a recording says little.
 ALONE = 2
 # What is left of a change of masses beside a body on the last link, as a share of it, up to which it is that body: no model is exact.
-# A mass of which as much is told by no row is not told.
+# A mass of which as much shows in no row is not determined.
 LEFT_OF_PAYLOAD, UNDETERMINED = 0.1, 1e-6
 # A parameter below so many standard deviations is no size that a share can be taken of.
 SIGNIFICANT_STDS = 5.0
@@ -162,7 +162,7 @@ def sizes_in_words(cause: Cause, scene: Scene, size: Array, covariance: Array) -
     """Return by name how large a change is, with what it is uncertain by.
 
     Of a watched effect these are its physical parameters, but for phases; of masses and inertias it is the mass of a payload,
-    if a body on the last link makes that change and its mass is told.
+    if a body on the last link makes that change and its mass is determined.
     """
     if cause.effect == "inertia":
         mass = _payload(scene, size, covariance)
@@ -179,7 +179,7 @@ def sizes_in_words(cause: Cause, scene: Scene, size: Array, covariance: Array) -
 
 
 def _payload(scene: Scene, size: Array, covariance: Array) -> Parameter | None:
-    """Return the mass of a body on the last link that changes the base parameters by this; None where none does, or it is not told."""
+    """Return the mass of a body on the last link that changes the base parameters by this; None where none does, or it is not determined."""
     term, last = scene.model.rigid_body, 10 * tool_of(scene.robot).joint
     columns = term.base.grouping[term.kept, last : last + 10]
     variances, axes = np.linalg.eigh(covariance)

@@ -123,7 +123,7 @@ def find_changes(history: History, scatter: Scatter, tried: float) -> tuple[Chan
 def _needed(found: Sequence[_Named], first: _Search, causes: Sequence[Cause], tried: float) -> list[_Named]:
     """Return what is still sure beside all others, with its size beside them: what came later may be what came first, and more.
 
-    Of friction that is told as a whole first, and then as its Coulomb part, nothing may be left of the whole.
+    Of friction that is named as a whole first, and then as its Coulomb part, nothing may be left of the whole.
     """
     left = list(found)
     while left:
@@ -268,7 +268,7 @@ class _Trial:
 
 @dataclass(frozen=True, eq=False)
 class _Named:
-    """What was found at one step, what it is beside all that was found, and the causes that it was not told from."""
+    """What was found at one step, what it is beside all that was found, and the causes that it was not distinguished from."""
 
     trial: _Trial
     beside: _Trial

@@ -183,7 +183,7 @@ def common_removed(rows: Sequence[DateRows]) -> tuple[list[Array], list[Array]]:
 
 
 def freedom_of(steps: int) -> float:
-    """Return the degrees of freedom of a scatter that so many differences told."""
+    """Return the degrees of freedom of a scatter of so many differences."""
     return max(1.0, EFFICIENCY * steps)
 
 

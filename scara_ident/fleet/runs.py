@@ -53,7 +53,7 @@ def joint_scatter(steps: Array, noise: Array) -> Array:
 
     They are fitted together, none below zero, in units of what differences scatter by with them, until both agree: estimates of
     restricted maximum likelihood (Anderson 1973), but for differences that lie far out, see `scatter`. What the noise hardly
-    tells apart is so told in sum: each for itself, the offset and the torque scale of an axis that lifts a weight slowly were none.
+    tells apart is so distinguished in sum: each for itself, the offset and the torque scale of an axis that lifts a weight slowly were none.
 
     Parameters
     ----------

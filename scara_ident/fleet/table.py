@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from scara_ident.fleet.fleet import Fleet
 
-# An effect of which the model leaves less than this share of its columns is not told from it.
+# An effect of which the model leaves less than this share of its columns is not distinguished from it.
 SEEN_SHARE = 1e-5
 COLUMNS = (
     "arm", "date", "quantity", "joint", "unit", "parameter", "std", "effect", "since", "error", "verdict", "changes",
@@ -177,7 +177,7 @@ def _of_date(
 
 
 def _sizes(history: History, visit: Visit) -> Iterator[tuple[Cause, Array, Array]]:
-    """Give the coefficients of each watched effect beside the model alone, and their covariance; NaN where not told."""
+    """Give the coefficients of each watched effect beside the model alone, and their covariance; NaN where not determined."""
     base, total = len(history.model.columns), max(int(own.max(initial=0)) for own in visit.columns) + 1
     stacked = []
     for own, factor, rows in zip(visit.columns, visit.factors, visit.rows, strict=True):

@@ -12,7 +12,7 @@ from scara_ident.effects.parameters import Parameter
 from scara_ident.fleet.causes import Cause, sizes_in_words
 from scara_ident.fleet.changes import Change
 
-# Of several sizes those are named that are told from zero by so many standard deviations.
+# Of several sizes those are named that differ from zero by so many standard deviations.
 NAMED_STDS = 2.0
 
 

@@ -223,7 +223,7 @@ class Work:
     def _key(self, kind: str, files: Sequence[RecordingFile], more: bytes) -> str:
         from scara_ident import __version__
 
-        # The name says which trajectory it is, and arm and date are in what is told of faults.
+        # The name says which trajectory it is, and arm and date are in what is said of faults.
         contents = [part for file in files for part in (self.keys[file], file.arm, file.date, file.place)]
         return key_of(kind, __version__, self.robot, self.settings.model, *contents, more)
 

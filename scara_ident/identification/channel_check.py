@@ -210,7 +210,7 @@ def _suspects(errors: Array, pushing: NDArray[np.bool_]) -> list[Suspect]:
 
 
 def _all_turned(value: Array, observations: Observations, pushing: NDArray[np.bool_]) -> bool:
-    """Tell whether every effort has the opposite sign, which leaves as much as the right one and so is told by no residual.
+    """Tell whether every effort has the opposite sign, which leaves as much as the right one and so shows in no residual.
 
     Friction pushes on some joint and brakes on none; and it pushes on all, with less energy fed in than none, or gravity and
     inertia are the opposite of the URDF's wherever these tell.

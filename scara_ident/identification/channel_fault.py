@@ -33,7 +33,7 @@ class ChannelFault:
     unsigned : bool
         Whether the effort is a magnitude; its errors are of these joints alone.
     by_bodies : bool
-        Whether gravity and inertia told that every effort has the opposite sign, of which no residual speaks.
+        Whether gravity and inertia show that every effort has the opposite sign, of which no residual speaks.
     """
 
     signal: Signal

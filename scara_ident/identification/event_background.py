@@ -30,7 +30,7 @@ STARTS, HALF = 12, 1.548
 ALIKE = 0.02
 # Seconds of a recording below which its trend is an offset alone.
 LONG_ENOUGH = 10.0
-# What depends on the state is told by what is seen in other parts of about so long, s, than an event's own: hardly any event
+# What depends on the state is determined by what is seen in other parts of about so long, s, than an event's own: hardly any event
 # reaches beyond one of them and those beside it.
 PART = 3.0
 

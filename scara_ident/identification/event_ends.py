@@ -144,7 +144,7 @@ def _lasting(parts: Sequence[Array], length: int, near: int, far: int) -> tuple[
     mean = np.sum(weight * relative[:, sure], axis=1) / np.maximum(np.sum(weight, axis=1), 1e-300)
     shift = np.repeat(mean[:, None], last - first, axis=1)
     if len(parts) > 3:
-        # A force that is told by other joints may be wrong about one.
+        # A force that is determined by other joints may be wrong about one.
         of_shape = parts[3][:, sure]
         agrees = np.sum(weight * (2.0 * relative[:, sure] - of_shape) * of_shape, axis=1) >= 0.0
         shift[agrees] = parts[3][agrees, inside]

@@ -93,7 +93,7 @@ def standing_out(
         Of all recordings, of parameters that no event has steered, less their background.
     earlier : callable
         Returns residuals of the same in which an event has to be seen too: of least squares, because what that explains is a
-        state of motion that the robust fit took for an outlier; before trends were taken off, because one that is told by the
+        state of motion that the robust fit took for an outlier; before trends were taken off, because one that is estimated from the
         rest of a run may be wrong where the run was once. Asked only where something stands out.
     shape : callable, optional
         Returns what an event from a bin to before another would leave in every bin, N m or N, shape (n, M); None where nobody

@@ -22,7 +22,7 @@ SAMPLES = 6
 WHOLE, MEMORY = 0.999, 1.0
 # Rounds in which joints are weighed by what is left of each.
 ROUNDS = 3
-# Share of a column's square that keeps those that are not told from growing.
+# Share of a column's square that keeps undetermined ones from growing.
 HELD = 1e-9
 # Share of a joint's torque that counts as none left.
 LEAST = 1e-6

@@ -21,7 +21,7 @@ ROUNDS = 20
 MIN_UNEXPLAINED = 0.1
 # A share of the largest effort that counts as zero: resampling a log leaves rounding below it.
 ZERO = 1e-9
-# Directions that columns show by less than this share of the best are not told by the rows that are left where some are held out.
+# Directions that columns show by less than this share of the best are not determined by the rows that are left where some are held out.
 SHOWN = 1e-3
 # The torque whose sign is missing is so many times what is left where it was not fitted, as a sign that chance gave is not.
 SEEN = 3.0

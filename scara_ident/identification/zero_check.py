@@ -19,7 +19,7 @@ from scara_ident.identification.few_rows import FewRows
 from scara_ident.identification.gravity_check import SAME_GRAVITY, left_under, other_gravities
 from scara_ident.identification.reading_search import SAME, ZERO_COST, cost, searched
 
-# Readings that leave as much and are named; of more nothing is told.
+# Readings that leave as much and are named; of more nothing is said.
 MAX_READINGS = 2
 
 
@@ -57,7 +57,7 @@ def wrong_zeros(
 ) -> WrongZeros | None:
     """Return the reading with other zeros that explains recordings, if one does and neither signs nor gravity do as simply.
 
-    Where several do, what they have in common is told, and the next round looks at the rest.
+    Where several do, what they have in common is reported, and the next round looks at the rest.
 
     Parameters
     ----------

@@ -189,7 +189,7 @@ class Inquiry:
     def just_seen(self) -> dict[str, Array]:
         """Half axes of the coefficients that the recordings at hand show as well as a suspect's, (k, r) by label.
 
-        All on the ellipsoid are told from none by as many standard errors as the suspect's own; where nothing is known, or
+        All on the ellipsoid are distinguished from none by as many standard errors as the suspect's own; where nothing is known, or
         nothing of these shows, they are alone on it.
         """
         found = {}

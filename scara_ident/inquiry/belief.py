@@ -226,7 +226,7 @@ def _times_negligible(scene: Scene, item: Suspect) -> float:
 def times_apart(
     inquiry: Inquiry, asked: Sequence[Suspect], rows: Information, criteria: SelectionCriteria = CRITERIA
 ) -> dict[str, float]:
-    """Return how many times as large as the diagnosis needs it each effect is, to be told from the nearest other.
+    """Return how many times as large as the diagnosis needs it each effect is, to be distinguished from the nearest other.
 
     Parameters
     ----------

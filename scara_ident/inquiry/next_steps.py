@@ -137,7 +137,7 @@ def _recordings(diagnosis: Diagnosis) -> Iterator[NextStep]:
             "record a trajectory that takes no part in the diagnosis and give it with --validate",
             longest,
         )
-    speeds = "the same path at another speed, so that a lag in time is told from what goes with speed"
+    speeds = "the same path at another speed, so that a lag in time is distinguished from what goes with speed"
     correction = diagnosis.search.correction
     # Of what is less than a sample no motion tells more.
     if correction is not None and correction.negligible(diagnosis.search.scene) is None:

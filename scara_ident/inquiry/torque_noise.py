@@ -46,7 +46,7 @@ def noise_density(diagnosis: Diagnosis) -> Array:
         if white > taken[j] and weight > 0.0:
             squares = float(error @ error) / weight**2
             of_positions = made[j] * sum(part.steps[j] * len(part.kept[j]) for part in parts)
-            # Each is known to a share of ``sqrt(2 / white)``: less than twice the error of their difference is not told from it.
+            # Each is known to a share of ``sqrt(2 / white)``: less than twice the error of their difference is not significant.
             level[j] = max(squares - of_positions, min(1.0, 4.0 / np.sqrt(white)) * squares) / (white - taken[j])
             thinned, count = thinned + white, count + len(error)
     size = np.sqrt(np.clip(np.diag(after.information.inverse()), 0.0, None))
@@ -55,5 +55,5 @@ def noise_density(diagnosis: Diagnosis) -> Array:
     if not (np.any(known) and count):
         return level / rate
     scatter = float(np.median((after.std[known] / plain[known]) ** 2)) * thinned / count
-    # A variance told by so many blocks is this far off by chance, one standard deviation.
+    # A variance estimated from so many blocks is this far off by chance, one standard deviation.
     return level * max(1.0, scatter / float(1.0 + np.sqrt(2.0 / len(model.owner)))) / rate

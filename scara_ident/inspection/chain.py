@@ -44,7 +44,7 @@ def arm_of(urdf: Path, pattern: str | None = None) -> Robot:
 
 
 def numbered_joints(robot: Robot, count: int) -> list[int] | None:
-    """Return the joints that ``count`` channels told by number belong to, in order; None where that is open.
+    """Return the joints that ``count`` numbered channels belong to, in order; None where that is open.
 
     Tried are all joints, then those without ends that hang on the arm beside others, then the longest chain: a log of an
     arm has no channels of wheels, fingers and heads. A chain counts from the base outwards, all joints as the URDF does.

@@ -113,7 +113,7 @@ def inspect_file(
     path : path
         A recording of any kind that can be read, or the folder of a rosbag2 recording.
     urdf : path, optional
-        The arm, or the name of a robot of example-robot-data; without it columns are told by their names alone.
+        The arm, or the name of a robot of example-robot-data; without it columns are recognised by their names alone.
     robot : path, optional
         A robot description, whose mapping is then used instead of a guess.
     joints : str, optional
@@ -158,7 +158,7 @@ def inspect_file(
     found = guess(meanings | by_place, numbers, arm, stated=bool(topics))
     found.notes[:0] = arm.notes
     if by_place:
-        found.notes.append("no header: columns told by their places and slopes; check every one")
+        found.notes.append("no header: columns recognised by their places and slopes; check every one")
     described = mapping(found, arm)
     if len(topics) > 1 and topic is not None:
         described = {"topic": topic, **described}

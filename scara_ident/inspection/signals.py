@@ -11,7 +11,7 @@ from scara_ident.manners import several
 from scara_ident.robot.robot import Robot
 from scara_ident.robot.units import table_of
 
-# What a note says between a signal and the number of its channels, by which such notes are told, and of several.
+# What a note says between a signal and the number of its channels, by which such notes are recognised, and of several.
 SHORT, EACH = " has ", " each have "
 
 
@@ -24,7 +24,7 @@ class Signal:
     template : str
         The columns with the joint or its number as a placeholder.
     first_number : int or None
-        Number of the first joint's column where joints are told by number; None where they are told by name.
+        Number of the first joint's column where joints are numbered; None where they are named.
     units : dict of int to str
         Unit of each joint's column; empty where it is not known.
     side : {"joint", "motor"}
@@ -61,9 +61,9 @@ def of_other_kind(said: Meaning, quantity: str, slides: bool) -> bool:
 
 
 def groups(quantity: str, meanings: Mapping[str, Meaning], joints: int) -> list[tuple[str, bool, dict[int, str]]]:
-    """List the columns that may be one signal: their template, whether joints are told by name, and the columns.
+    """List the columns that may be one signal: their template, whether joints are named, and the columns.
 
-    What is told by name is told by number too: where columns count J0, J1 and joints j1, j2, names mislead. Columns that
+    What names joints may number them too: where columns count J0, J1 and joints j1, j2, names mislead. Columns that
     differ in their units alone are one signal, unless a joint has two of them.
     """
     named: dict[str, dict[int, str]] = {}

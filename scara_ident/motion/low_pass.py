@@ -67,7 +67,7 @@ def low_pass_every(signal: Array, rate: float, cut: float | None, step: int, wei
     """Return every ``step``-th sample of `low_pass`, from the first on, without computing the others.
 
     What leaving out samples does to the spectrum is in the gains, so that the result is the same to rounding if `low_pass`
-    is told the step.
+    is given the step.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A change told from noise as samples come in, with a false-alarm rate that is known.
+"""Changes distinguished from noise as samples come in, with a false-alarm rate that is known.
 
 Innovations, what the parameters so far leave of new torques, are white once they are divided by the root of their
 covariance. Their scores along the causes that are looked for are averaged exponentially (MEWMA, Lowry, Woodall,
@@ -30,7 +30,7 @@ class Alarm:
     Attributes
     ----------
     sample : int
-        Samples taken in when it was seen; it is told a window later, when more is known of what it is.
+        Samples taken in when it was seen; it is reported a window later, when more is known of what it is.
     effect : str
         The likeliest: ``friction``, ``torque_scale`` or ``payload_change``.
     joint : str or None

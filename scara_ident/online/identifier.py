@@ -105,7 +105,7 @@ class OnlineIdentifier:
         Returns
         -------
         Alarm or None
-            Where a change is told with this sample.
+            Where a change is reported with this sample.
 
         Raises
         ------

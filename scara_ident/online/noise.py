@@ -20,7 +20,7 @@ MOST = 0.4
 SURE = 2.0
 # In a band that does it is no more than the torque's even there, and so a fifth of it over the band.
 ENOUGH = 0.2
-# In a row it grows as this power of the band. From this share on nothing of the rest is told by what is left.
+# In a row it grows as this power of the band. From this share on nothing of the rest is determined by what is left.
 GROWTH, NEARLY_ALL = 4.0, 0.95
 # Samples that the size of the noise is averaged over.
 NOISE_SAMPLES = 1e6

@@ -151,7 +151,7 @@ def read_recording(path: Path | str, robot: Robot, *, need_effort: bool = True) 
     names = column_names(path, channels.topic)
     placed = (channel.column for signal in SIGNALS for channel in channels.of(signal))
     used = [channels.time.column, *(column for column in placed if column in names)]
-    # Without a clock it is not told where a long file has gaps.
+    # Without a clock it is not known where a long file has gaps.
     whole = shared or channels.rate is not None
     long = None if whole else long_file(path, channels.time.column, used)
     if long is not None:

@@ -90,7 +90,7 @@ def _may_share(recordings: Sequence[Recording]) -> list[int]:
 
 
 def _few(recording: Recording) -> Hashes:
-    """Return different hashes of the first joint's samples, of one in so many, which are told by the bits of their positions."""
+    """Return different hashes of the first joint's samples, of one in so many, which are chosen by the bits of their positions."""
     position = recording.position[0] + 0.0
     asked = (position.view(np.uint64) * _ODD) >> np.uint64(64 - SPARSE_BITS) == 0
     signals = [recording.position] if recording.effort is None else [recording.position, recording.effort]

@@ -1,1 +1,1 @@
-"""What a person and a program are told: JSON, terminal tables, figures."""
+"""What a person and a program read: JSON, terminal tables, figures."""

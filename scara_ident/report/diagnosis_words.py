@@ -21,11 +21,11 @@ from scara_ident.report.doubts import doubts
 from scara_ident.report.identification import bias_said
 from scara_ident.robot.rotors import GUESS_FACTOR
 
-# An uncertainty below this factor is told as a standard deviation.
+# An uncertainty below this factor is written as a standard deviation.
 NEAR = 1.3
 # Two values differ from so many of their common standard deviations: 0.3 %.
 DIFFERENT_STDS = 3.0
-# An error is told to be worse from so many times on: less may be chance.
+# An error is said to be worse from so many times on: less may be chance.
 WORSE = 1.2
 
 
@@ -123,14 +123,14 @@ def quantity(name: str, parameter: Parameter) -> str:
     if interval is not None and np.any(np.isfinite(interval)):
         return f"{name} {_written(parameter.value, 4)}{unit} ({ends(interval)}, 95 %)"
     if interval is not None or not np.isfinite(parameter.std):
-        return f"{name} about {parameter.value:.3g}{unit} (not told by recordings)"
+        return f"{name} about {parameter.value:.3g}{unit} (not determined by recordings)"
     # What says by which law an effect is has no uncertainty.
     unsure = f" ± {parameter.std:.1g}" if parameter.std else ""
     return f"{name} {parameter.value:.3g}{unsure}{unit}"
 
 
 def ends(interval: tuple[float, float]) -> str:
-    """Return an interval of which one end at least is told in words."""
+    """Return an interval of which one end at least is written in words."""
     low, high = (_written(end, 3) for end in interval)
     if np.all(np.isfinite(interval)):
         return f"{low} to {high}"

@@ -1,4 +1,4 @@
-"""What makes all parameters mean something else than their names say: it is told before them, wherever they are told."""
+"""What makes all parameters mean something else than their names say: it is said before them, wherever they are reported."""
 
 from __future__ import annotations
 

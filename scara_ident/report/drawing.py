@@ -54,7 +54,7 @@ MAX_PARTS = 600
 
 
 def draw(path: Path, title: str, rows: Sequence[Sequence[Figure]]) -> None:
-    """Draw figures, each with its only variant, in rows; a row has one legend, unless rows above have told all of it.
+    """Draw figures, each with its only variant, in rows; a row has one legend, unless rows above have named all of it.
 
     Parameters
     ----------

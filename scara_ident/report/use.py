@@ -1,4 +1,4 @@
-"""What is told of a model in use: ``use.json`` and the sentences."""
+"""What is reported of a model in use: ``use.json`` and the sentences."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from scara_ident.use.worth import EffectWorth
 
 # What is fed forward does harm where it leaves so many times the error that is left without, and more of that of the PID alone
-# than a draw of the arm changes, and than is told: in whole per cent the two would be one number.
+# than a draw of the arm changes, and than is written: in whole per cent the two would be one number.
 HARM, HARM_OF_PID = 1.1, 0.01
 # What is fed forward, in words.
 WORDS = {
@@ -64,7 +64,7 @@ def worth_dict(model: IdentifiedModel) -> dict[str, Any]:
     try:
         found = worth(model)
     except ScaraIdentError as error:
-        return {"tracking": None, "why": str(error), "summary": [f"What the effects cost is not told: {error}."]}
+        return {"tracking": None, "why": str(error), "summary": [f"What the effects cost is not known: {error}."]}
     robot = model.robot
     return {
         "summary": [_shares_said(found.rms), *(_cost_said(item, found.rms) for item in found.each), *found.notes],

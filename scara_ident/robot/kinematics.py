@@ -11,7 +11,7 @@ from scara_ident.arrays import Array
 from scara_ident.errors import RobotError
 from scara_ident.robot.robot import Robot
 
-# Directions of a force below this share of the best told one are not felt, and an axis is told with this share of it in others.
+# Directions of a force below this share of the best determined one are not felt, and an axis is determined with this share of it in others.
 UNFELT, DETERMINED = 1e-3, 0.999
 
 
@@ -122,7 +122,7 @@ def felt_directions(robot: Robot, configurations: Iterable[Array]) -> int:
 def weakest_direction(rows: Sequence[Array] | Array, directions: int) -> float:
     """Return how well single rows (n, 3) of `constant_force` tell the last of so many directions, over the first.
 
-    It is small near a singular pose, where that direction is told by how the arm turns meanwhile, and so by how constant the force
+    It is small near a singular pose, where that direction is determined by how the arm turns meanwhile, and so by how constant the force
     is.
     """
     singular = [np.linalg.svd(row, compute_uv=False) for row in rows]

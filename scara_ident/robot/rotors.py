@@ -34,7 +34,7 @@ class RotorGuess:
     armature : ndarray, shape (n,)
         N^2 Jm at the joint, kg m^2 or kg; 0 where neither a limit nor a link tells anything.
     by_limit : ndarray of bool, shape (n,)
-        Where the effort limit told it; elsewhere the links did.
+        Where it follows from the effort limit; elsewhere the links did.
     """
 
     armature: Array

@@ -1,4 +1,4 @@
-"""The first run on a machine: the loop becomes machine code, which is kept, and whoever waits is told."""
+"""The first run on a machine: the loop becomes machine code, which is kept, and whoever waits is informed."""
 
 from __future__ import annotations
 

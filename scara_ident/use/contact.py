@@ -38,7 +38,7 @@ class Contact:
     torque : ndarray, shape (n,)
         Mean external torque while it is strong, recorded side.
     place : str
-        ``tool``, or the outermost link that it may act on, as told by the joints that it loads.
+        ``tool``, or the outermost link that it may act on, by the joints that it loads.
     estimate : ContactForce
         What its torque says of the force.
     """
@@ -54,7 +54,7 @@ class Contact:
 
     @property
     def force(self) -> Array | None:
-        """Constant force on the place that explains it, base frame, N, shape (3,); None where it is not told."""
+        """Constant force on the place that explains it, base frame, N, shape (3,); None where it is not determined."""
         return self.estimate.force
 
     @property
@@ -74,13 +74,13 @@ class Contact:
             return "-"
         size = float(np.linalg.norm(self.force))
         along = self.force / size
-        # Along an axis that is not told the force is zero.
+        # Along an axis that is not determined the force is zero.
         std = float(np.sqrt(along @ np.nan_to_num(self.force_covariance) @ along))
         return f"{size:.3g} ± {std:.1g} N"
 
     @property
     def point_words(self) -> str:
-        """Where on its link the force acts beside the tool, m; a dash where that is not told."""
+        """Where on its link the force acts beside the tool, m; a dash where that is not determined."""
         point, std = self.estimate.point, self.estimate.point_std
         if point is None or std is None:
             return "-"

@@ -22,11 +22,11 @@ from scara_ident.use.observer import ContactObserver
 # A constant force at the tool explains at least this share of the squared torque of a contact there, on at least so many
 # joints: on fewer nearly any torque is that of some force.
 FITS, MIN_JOINTS = 0.75, 3
-# Of a direction of the force that is told so much worse than another at once, none is told.
+# Of a direction of the force that is determined so much worse than another at once, none is reported.
 MIN_DIRECTION_RATIO = 0.03
 # Probability that a force where it is said to act is refused for what it leaves of the torque.
 REFUSED = 0.01
-# Force and point of a contact are six numbers, told by so many joints.
+# Force and point of a contact are six numbers, determined by so many joints.
 JOINTS_FOR_POINT = 6
 # The last joint is loaded by more than so many standard deviations of its torque, which no contact farther in does.
 LOADED = 4.0
@@ -52,7 +52,7 @@ class ContactForce:
         Of that force; NaN along axes that the arm does not tell.
     point, point_std : ndarray, shape (3,), or None
         Where on the last link it acts, as near to the tool as the torque allows, in that link's frame, m; None where it acts
-        on the tool or is not told.
+        on the tool or is not determined.
     """
 
     explained: float
@@ -72,7 +72,7 @@ def contact_force(
     low-pass leaves as the arm moves on. It is believed where what it leaves is the residual without contact, or changes as
     much during the contact. Where it leaves more and the last joint is loaded, the force is on a point of the last link beside
     the tool, which six joints or more tell (De Luca and Mattone 2005): f and that point are the most likely ones, the
-    point being near the tool to `ABOUT_TOOL`. Along the force no point is told from another.
+    point being near the tool to `ABOUT_TOOL`. Along the force no point is distinguished from another.
 
     Near a singular pose there is no force: an arm that does not feel one of the directions at once takes any change of the force
     for more or less of it.
@@ -117,7 +117,7 @@ def contact_force(
 def _leaves_noise(row: Array, torque: Array, unsure: Array) -> bool:
     """Whether the best of all forces leaves of a torque (n,), by a row (n, 3), what its covariance (n, n) does.
 
-    A direction that is told little is one of the best force's too: of a strong force it is more than noise.
+    A direction that is determined little is one of the best force's too: of a strong force it is more than noise.
     """
     from scipy.special import chdtrc
 

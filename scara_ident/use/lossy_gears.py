@@ -21,7 +21,7 @@ def is_lossy(term: Term, value: Array) -> bool:
 class LossyGears:
     """Turns the torque of drives into that on links, recorded side.
 
-    A gear loses a share of all that it transmits, of a contact's torque too. So what it transmits is told from the motor's side,
+    A gear loses a share of all that it transmits, of a contact's torque too. So what it transmits is computed from the motor's side,
     from which the law of the loss is inverted: ``load = s (u - u_f - dp_r/dt)`` with the recorded torque u, its friction u_f, the
     momentum p_r of the rotor, and s the share that the gear passes on, below 1 where it drives and above 1 where it is driven
     (Hamon, Gautier, Garrec 2011). Which of both it does takes the acceleration, and that through a low-pass will do: where

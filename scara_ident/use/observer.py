@@ -1,4 +1,4 @@
-"""An observer of contact with the arm: told sample by sample, or over recordings, beside thresholds from motion without."""
+"""An observer of contact with the arm: sample by sample, or over recordings, beside thresholds from motion without."""
 
 from __future__ import annotations
 
@@ -204,7 +204,7 @@ def _usual_speed(free: Sequence[Recording]) -> Array:
 
 def _observed(external: ExternalTorque, item: Recording, *, velocity: bool) -> Observed:
     if item.effort is None:
-        raise RecordingError(f"{item.path or item.name}: no effort was recorded; contact cannot be told without")
+        raise RecordingError(f"{item.path or item.name}: no effort was recorded; contact cannot be detected without")
     if velocity and item.velocity is None:
         raise RecordingError(
             f"{item.path or item.name}: no velocity was recorded, as it was without contact; record it here too"

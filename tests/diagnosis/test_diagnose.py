@@ -249,6 +249,6 @@ def test_what_is_told_from_a_lower_band_is_of_one_model_and_what_is_left_is_judg
     assert (found.value, found.std) == (result.after.value[len(place)], result.after.std[len(place)])
     assert min(outcome.search.bands) > 8.0
     assert outcome.training.data.bands == outcome.residuals.data.bands == there.after.data.bands == outcome.search.bands
-    assert any(note.startswith("all is told below 8 Hz") for note in result.notes)
+    assert any(note.startswith("all is estimated below 8 Hz") for note in result.notes)
     # Bands that were asked for are kept.
     assert diagnose(ROBOT, runs, bands=BANDS, catalogue=(Spring(),)).search.bands == BANDS

@@ -44,6 +44,6 @@ def test_the_pictures_are_small():
 def test_what_the_page_says_was_found_is_what_the_program_finds_today(name: str):
     robot, runs, hidden = gallery.recordings(name)
     effect = next(found for found in diagnose(robot, runs).effects if found.effect == name)
-    told = gallery.told_of(name, robot, runs, hidden, effect)
+    told = gallery.computed_of(name, robot, runs, hidden, effect)
     shown = gallery.computed_in(PAGE)[name]
     assert not_printed(shown.splitlines(), told) is None, f"run: python docs/gallery.py; found now:\n{told}"

@@ -65,8 +65,8 @@ def test_where_the_effects_make_it_worse_it_is_said(result):
         (1504.0, -1.0, "stiffness 3845 N m/rad (2160 to 17700, 95 %)"),
         (2000.0, -1.0, "stiffness 3845 N m/rad (above 1880, 95 %)"),
         (9000.0, 0.5, "stiffness 3845 N m/rad (below 42900, 95 %)"),
-        (38450.0, 0.0, "stiffness about 3.84e+03 N m/rad (not told by recordings)"),
-        (np.inf, -1.0, "stiffness about 3.84e+03 N m/rad (not told by recordings)"),
+        (38450.0, 0.0, "stiffness about 3.84e+03 N m/rad (not determined by recordings)"),
+        (np.inf, -1.0, "stiffness about 3.84e+03 N m/rad (not determined by recordings)"),
     ],
 )
 def test_an_interval_is_said_where_a_standard_deviation_says_too_little(std: float, even_power: float, said: str):

@@ -19,4 +19,4 @@ def test_where_no_arm_has_the_effects_that_is_said_in_a_line() -> None:
         worth(model)
     told = worth_dict(model)
     assert told["tracking"] is None
-    assert told["summary"] == [f"What the effects cost is not told: {told['why']}."]
+    assert told["summary"] == [f"What the effects cost is not known: {told['why']}."]

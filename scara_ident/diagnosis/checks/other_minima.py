@@ -82,10 +82,10 @@ def as_good(step: SelectionStep) -> Iterator[SelectionStep]:
 
 
 def quieter(step: SelectionStep) -> SelectionStep | None:
-    """Return the fit in the lower part of the band where what is told of effects that act together is to be told from there.
+    """Return the fit in the lower part of the band where effects that act together are to be estimated there.
 
     That is where the noise of positions moves the step's away from it, what lags has no such noise there, and every effect of the
-    step is told there; else None.
+    step is determined there; else None.
     """
     places = _together(step)
     below = _below(step) if places else None

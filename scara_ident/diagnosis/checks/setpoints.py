@@ -1,4 +1,4 @@
-"""Whether recorded positions are what the arm was told instead of what it did, and what is to be believed of effects then.
+"""Whether recorded positions are what the arm was commanded instead of what it did, and what is to be believed of effects then.
 
 An arm lags behind its setpoints by what its controller needs to build up the torque, which turns round with friction over some way of
 them: nothing in the recordings tells that from friction or a gear that yields.
@@ -18,7 +18,7 @@ OR_ELSE = "; positions are smoother than any encoder's, and should they be setpo
 
 
 def setpoint_objection(step: SelectionStep, decision: Decision) -> str | None:
-    """Say so where positions are computed, beside efforts in steps, which no simulator needs to have, and an effect is told by small ways.
+    """Say so where positions are computed, beside efforts in steps, which no simulator needs to have, and an effect is determined by small ways.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ def setpoint_objection(step: SelectionStep, decision: Decision) -> str | None:
 
 
 def may_be_setpoints(data: PreparedData, effect: Effect, member: Member) -> bool:
-    """Whether an effect is told by small ways of a joint, and all recordings have computed positions of that joint."""
+    """Whether an effect is determined by small ways of a joint, and all recordings have computed positions of that joint."""
     if not effect.in_small_ways or member.joint is None:
         return False
     return all(is_computed(item.recording.position[member.joint]) for item in data.recordings)

@@ -79,9 +79,9 @@ def corrected(data: PreparedData, correction: Correction) -> PreparedData:
 
 
 def correction_step(step: SelectionStep, candidate: Candidate) -> SelectionStep:
-    """Return the step that the size of a correction is told beside.
+    """Return the step that the size of a correction is estimated beside.
 
-    What each recording has of its own is told in the lower part of the band: a controller answers the noise of positions, which
+    What each recording has of its own is estimated in the lower part of the band: a controller answers the noise of positions, which
     makes another of the same size in every recording of a kind of motion. What runs differ by otherwise is noise to it, or taken
     for it where a run moves little.
 

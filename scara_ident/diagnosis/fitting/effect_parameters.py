@@ -25,7 +25,7 @@ from scara_ident.estimation.run_variation import MIN_RUNS
 from scara_ident.estimation.variation_between import run_variation
 from scara_ident.estimation.working_range import DeterminedDirections, determined_directions
 
-# A rotor is told by the data where they leave less than this share of its prior's standard deviation.
+# A rotor is determined by the data where they leave less than this share of its prior's standard deviation.
 DETERMINED_SHARE = 0.7
 # Logarithm that no factor of an armature exceeds: more is nothing known.
 LARGEST_LOG = 20.0
@@ -165,7 +165,7 @@ def physical_parameters(step: SelectionStep, *, of_runs: bool = True, of_noise: 
 
 
 def _beside(step: SelectionStep, candidate: Candidate, state: Linearised) -> NDArray[np.intp]:
-    """Return the columns of the effect beside which a candidate's parameters are told; none where it did not come in."""
+    """Return the columns of the effect beside which a candidate's parameters are estimated; none where it did not come in."""
     member = candidate.effect.estimated_beside(step.scene, candidate.member)
     places = [
         np.r_[own]
@@ -193,7 +193,7 @@ def _physical(
 def _further(scene: Scene, candidate: Candidate, linear: Coefficients, parameters: Mapping[str, Parameter]) -> Array:
     """Return by how much the variance of an effect's coefficients is more than that of the fit, shape (k,).
 
-    A coefficient that is told by its name among the physical parameters is as unsure as it is there: a family may know of more.
+    A coefficient that has its name among the physical parameters is as unsure as it is there: a family may know of more.
     """
     names = [column.name for column in candidate.effect.columns(scene, candidate.member)]
     named = [parameters.get(name) for name in names]
@@ -274,7 +274,7 @@ def _covariance(
 
 
 def _determined_directions(step: SelectionStep, state: Linearised) -> DeterminedDirections | None:
-    """Return what is told and what is left open where data were corrected alone, see `determined_directions`; None where all of it is determined."""
+    """Return what is determined and what is left open where data were corrected alone, see `determined_directions`; None where all of it is determined."""
     if any(not item.corrects_data for item in state.chosen):
         return None
     directions = determined_directions(beside_offsets(step.observations, step.offsets).fitted, 1.0 / step.weights)

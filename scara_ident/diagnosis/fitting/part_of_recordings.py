@@ -11,7 +11,7 @@ from scara_ident.diagnosis.candidates.candidates import CandidateColumns, column
 from scara_ident.diagnosis.testing.selection_step import SelectionStep
 from scara_ident.estimation.run_offsets import offsets_on
 
-# Every effect is told as well as by so many seconds of all recordings, s: of the slowest resonance that is tried a hundred periods.
+# Every effect is determined as well as by so many seconds of all recordings, s: of the slowest resonance that is tried a hundred periods.
 ENOUGH = 20.0
 
 

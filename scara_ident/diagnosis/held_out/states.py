@@ -1,4 +1,4 @@
-"""Which of the effects that act in some recordings act in a held-out one: told by its first part, judged on the rest.
+"""Which of the effects that act in some recordings act in a held-out one: estimated on its first part, judged on the rest.
 
 Where effects act in intervals of recordings, see `held_out_intervals`.
 """
@@ -36,7 +36,7 @@ class HeldOut:
     Attributes
     ----------
     data : PreparedData
-        What errors are of: the recordings, without their first part where that told their state.
+        What errors are of: the recordings, without their first part where their state is estimated on that.
     scene : Scene
         That knows when they began.
     chosen : tuple of Candidate

@@ -88,7 +88,7 @@ def _moved_by_noise(own: Coefficients, examination: Examination, essential: slic
 
 
 def _unsized(step: SelectionStep, candidate: Candidate, sizes: Mapping[str, Parameter]) -> str | None:
-    """Say so where the size of one of several effects that act together is not told: it may mend what another lacks."""
+    """Say so where the size of one of several effects that act together is not determined: it may mend what another lacks."""
     if size_is_determined(candidate.effect, sizes, step.criteria.min_size):
         return None
     return "its size is within its uncertainty beside those that it acts with, of which it may mend what they lack"

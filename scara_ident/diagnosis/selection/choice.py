@@ -130,8 +130,8 @@ def _plainer_first(order: Sequence[tuple[SelectionStep, Decision]]) -> list[tupl
 def _is_plainer(one: Decision, other: Decision) -> bool:
     """Whether one of two of the same effect is without intervals, or by the law of its name.
 
-    Where intervals begin and end all rows told, those held out among them, so that what they remove there says too much. A
-    law is said, and has to be told.
+    Where intervals begin and end all rows determined, those held out among them, so that what they remove there says too much. A
+    law is given, and has to be determined.
     """
     effect, more = one.candidate.effect, other.candidate.effect
     if effect.name != more.name:

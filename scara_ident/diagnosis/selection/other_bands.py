@@ -1,4 +1,4 @@
-"""A search whose effects are told in other bands than those in which they were found."""
+"""A search whose effects are estimated in other bands than those in which they were found."""
 
 from __future__ import annotations
 

@@ -144,7 +144,7 @@ class SearchTask:
         Families to try.
     criteria : SelectionCriteria
     progress : Work
-        Told every step that begins.
+        Called with every step that begins.
     asked_for : bool
         Whether somebody chose the families, so that one that cannot be tried is an error and no note.
     """

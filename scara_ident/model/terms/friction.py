@@ -165,7 +165,7 @@ class Offset(Filled):
         return lambda q, v, a: constant
 
     def notes(self) -> tuple[str, ...]:
-        """Say of which joints no offset is told, and why."""
+        """Say of which joints no offset can be determined, and why."""
         return tuple(
             f"{self.robot.joints[j]}: what it carries weighs the same wherever the arm is, so that no recording tells an offset of "
             "its torque from that weight; all of it is taken for weight, and masses are off by the offset over gravity if there is one"

@@ -29,7 +29,7 @@ CHUNK = 8192
 _RECORDING = threading.Lock()
 # Mass of a body for which any will do, kg.
 SPECK = 1e-3
-# The SCARA of Indri et al. 2002 and its P_d (equation 2), told by what the reduction finds.
+# The SCARA of Indri et al. 2002 and its P_d (equation 2), recognised by what the reduction finds.
 _SCARA_LEADS = ("I1zz", "mx2", "my2", "I2zz", "Ia2")
 _SCARA_MEANINGS = ("I1z + m2 l1^2 + Jm1/tau1^2", "m2 s2x", "m2 s2y", "I2z", "Jm2/tau2^2")
 

@@ -14,7 +14,7 @@ from scara_ident.recording.audit.samples import GAP_STEPS, Samples
 
 # Samples on either side over which the even clock is the median of the stamps, and over which a lost sample shows.
 REACH, LOST_REACH = 50, 4
-# Of fewer samples than twice that reach and more no even clock is told.
+# Of fewer samples than twice that reach and more no even clock is found.
 ENOUGH = 4 * REACH
 # An interval over so few samples is that of a step where few are lost; over many it is known better.
 NEARBY = 10
@@ -45,7 +45,7 @@ def even_clocks(samples: Samples) -> list[Array]:
     Returns
     -------
     list of ndarray, shape (N,)
-        Times in s by the stamps and by the positions; what cannot be told is missing.
+        Times in s by the stamps and by the positions; what cannot be found is missing.
     """
     time, clocks = samples.time, []
     usual = _midmean(np.diff(time))
@@ -69,7 +69,7 @@ def _midmean(values: Array) -> float:
 
 
 def _clock(time: Array, interval: float, steps: Array, determined: NDArray[np.bool_]) -> Array:
-    """Return even times of samples so many intervals apart or, where that is not told and the stamps do, more."""
+    """Return even times of samples so many intervals apart or, where that is not determined and the stamps do, more."""
     from scipy.ndimage import median_filter, minimum_filter1d, uniform_filter1d
 
     count = np.concatenate([[0.0], np.cumsum(steps)])
@@ -91,7 +91,7 @@ def _interval(time: Array, near: float) -> float:
     interval = near
     for reach in (2 * NEARBY, 4 * NEARBY, 2 * REACH):
         way = time[reach:] - time[:-reach]
-        # Over more samples it is known better; over fewer it was told well enough to see lost ones among these.
+        # Over more samples it is known better; over fewer it was known well enough to see lost ones among these.
         interval = float(np.median(way / np.maximum(reach, np.rint(way / interval))))
     return interval
 

@@ -23,7 +23,7 @@ LEVELS = ((0.1, 0.7), (0.5, 3.0))
 AHEAD = 5.0
 # The fit two steps beside a jump has one back of 0.42 of its size.
 SHADOW = 0.6
-# So many samples that are usually lost at once are told: such a log waits for something now and then, as for a plot.
+# So many samples that are usually lost at once are reported: such a log waits for something now and then, as for a plot.
 SEVERAL = 2
 # Beyond this share of the steps, or of the samples, velocities and accelerations are not those of the arm; below it, it is said ...
 MOST = 0.01

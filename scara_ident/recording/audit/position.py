@@ -243,7 +243,7 @@ def limits(samples: Samples) -> Checked:
 
 
 def computed(samples: Samples) -> Checked:
-    """Say where positions beside efforts are no measurement: a simulator's, or what an arm was told to do."""
+    """Say where positions beside efforts are no measurement: a simulator's, or what an arm was commanded to do."""
     moving = ~samples.idle()
     if samples.effort is None or not moving.any() or not all(map(is_computed, samples.position[moving])):
         return samples, []

@@ -73,7 +73,7 @@ def _contacts(found: ContactFindings) -> list[Block]:
         f"there explains the torque of {loaded}, else the outermost link that is loaded: the contact is there or farther out."
     )
     if any(each.estimate.point is not None for each in found.contacts):
-        words += " A force that is told beside the tool acts on a point of that link, given in its frame, as near to the tool as the torque allows."
+        words += " A force that is determined beside the tool acts on a point of that link, given in its frame, as near to the tool as the torque allows."
     head = ("recording", "from [s]", "to [s]", "joints", "torque", "over threshold", "place", "force", "point [m]")
     return [Paragraph(words), Table(head, rows, (1, 2, 4, 5, 7, 8))] if rows else []
 

@@ -26,7 +26,7 @@ MAX_FIGURES = 18
 # Share of a body's largest moment below which one of its products is rounding.
 NO_INERTIA = 1e-9
 PER_PAGE = 12
-# Pairs of parameters that are told in words, at the most, and the least size of their correlation.
+# Pairs of parameters that are named in words, at the most, and the least size of their correlation.
 MAX_PAIRS, STRONG = 4, 0.9
 
 
@@ -44,7 +44,7 @@ def parameter_table(estimate: Estimate) -> Table:
             interval = Cell(f"{digits(value - 1.96 * std, std)} … {digits(value + 1.96 * std, std)}", "num")
             percent = 100.0 * relative
             words = "over 1000 %" if relative >= 10.0 else f"{percent:.0f} %" if percent >= 10.0 else f"{percent:.2g} %"
-            tag = Tag("not told from 0", "bad") if weak else None
+            tag = Tag("not significant", "bad") if weak else None
             share = Cell(words, "unit", bar=relative, weak=weak, tag=tag)
         unit, meaning = Cell(superscripts(column.unit), "unit"), Cell(superscripts(column.meaning), "words")
         # Sums of inertias of the URDF that cancel leave rounding.
@@ -66,8 +66,8 @@ def unsure(parameter: Parameter) -> str:
     """Return a standard deviation, or the interval where that says too little."""
     interval = parameter.interval
     if interval is None:
-        return number(parameter.std, 2) if np.isfinite(parameter.std) else "not told"
-    return f"{ends(interval)} (95 %)" if np.any(np.isfinite(interval)) else "not told"
+        return number(parameter.std, 2) if np.isfinite(parameter.std) else "unknown"
+    return f"{ends(interval)} (95 %)" if np.any(np.isfinite(interval)) else "unknown"
 
 
 def link_table(estimate: ConsistentEstimate) -> Table:

@@ -50,8 +50,8 @@ def test_what_cancels_in_the_urdf_is_0_and_no_rounding(result, monkeypatch):
         (150.0, -1.0, "1.5e+02"),
         (1504.0, -1.0, "2160 to 17700 (95 %)"),
         (2000.0, -1.0, "above 1880 (95 %)"),
-        (38450.0, 0.0, "not told"),
-        (np.inf, 1.0, "not told"),
+        (38450.0, 0.0, "unknown"),
+        (np.inf, 1.0, "unknown"),
     ],
 )
 def test_the_table_has_the_interval_where_a_standard_deviation_says_too_little(
