@@ -36,7 +36,7 @@ from asking_sets import ASKED, DRAWS, PAIRS, WAYS, one_set
 
 from scara_ident.errors import ScaraIdentError
 
-KINDS = ("rivals", "below_limit")
+KINDS = ("confounders", "below_limit")
 
 
 def show(rows: Sequence[dict[str, Any]]) -> None:

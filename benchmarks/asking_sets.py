@@ -122,7 +122,7 @@ def seen(found: Diagnosis, first: Diagnosis, question: Question, runs: Sequence[
         spread = np.diag(examine(model, [torque])[0].covariance)
         return float(1.0 / np.sqrt(np.mean(spread))) if np.all(np.isfinite(spread) & (spread > 0.0)) else 1e-12
 
-    if question.kind == "rivals":
+    if question.kind == "confounders":
         return min(apart(one, other) for one, other in permutations(question.suspects, 2))
     return float(np.median([apart(item, None) for item in question.suspects]))
 
@@ -138,7 +138,7 @@ def question_of_truth(asked: Sequence[Question], truth: Effect) -> Question | No
     for item in asked:
         own = [suspect for suspect in item.suspects if right_one(suspect.label, truth)]
         if own:
-            return item if item.kind == "rivals" else replace(item, text=own[0].label, suspects=(own[0],))
+            return item if item.kind == "confounders" else replace(item, text=own[0].label, suspects=(own[0],))
     return None
 
 
@@ -148,7 +148,7 @@ def said(first: Diagnosis, design: Design, truth: Effect, quiet: Sequence[Record
     Of what may be below the limit, by its true size, which recordings without noise have.
     """
     asked = [item for item in design.tells if any(right_one(own.label, truth) for own in item.question.suspects)]
-    if not asked or asked[0].question.kind == "rivals":
+    if not asked or asked[0].question.kind == "confounders":
         return asked[0].settled if asked else None
     inquiry = inquire(first)
     scene, suspects = inquiry.scene, asked[0].question.suspects

@@ -33,7 +33,7 @@ DIAGNOSED = (
     *("band_hz", "noise_floor", "parameters", "training", "validation"),
 )
 # Keys that are prose, or outside of the contract.
-LEFT_OUT = ("meaning", "description", "why", "settled_by", "summary", "notes", "rivals")
+LEFT_OUT = ("meaning", "description", "why", "settled_by", "summary", "notes", "alternatives")
 
 
 def commands(shared: Path, sets: Path | None) -> dict[str, list[str]]:

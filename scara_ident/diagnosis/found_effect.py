@@ -69,7 +69,7 @@ class FoundEffect:
         """The effect and its joint, as a heading."""
         return self.effect if self.joint is None else f"{self.effect} on {self.joint}"
 
-    def rival_names(self, scene: Scene) -> tuple[str, ...]:
+    def confounder_names(self, scene: Scene) -> tuple[str, ...]:
         """Return the labels of `confounded_with`, and beside one that is its own what that member is."""
         return tuple(
             f"{item.label} ({item.candidate.effect.description(scene, item.candidate.member)})"

@@ -33,7 +33,7 @@ GLANCE_RATE, PER_PERIOD = 100.0, 5.0
 # Of what may be below the limit those that weigh less than this together are not looked at in a glance.
 LITTLE = 0.05
 # Weights of kinds of questions against that of what may be below the limit: what was found comes first.
-WEIGHTS = {"rivals": 2.0, "unexplained": 2.0, "below_limit": 1.0, "parameter": 0.2}
+WEIGHTS = {"confounders": 2.0, "unexplained": 2.0, "below_limit": 1.0, "parameter": 0.2}
 # How many times what is needed is worth having: noise and size are foreseen to a factor or two.
 ENOUGH = 5.0
 

@@ -28,7 +28,7 @@ class ChannelFault:
         either reading explains badly), on blocks of time that the parameters were not fitted to, as mapped and as it should be.
     zeros : tuple of JointReading
         Of each joint, where its position counts from elsewhere by quarter turns, how it is to be read; else empty.
-    rivals : tuple of str
+    alternatives : tuple of str
         In words, what leaves as much as these zeros, so that it may be that instead.
     unsigned : bool
         Whether the effort is a magnitude; its errors are of these joints alone.
@@ -42,7 +42,7 @@ class ChannelFault:
     error: float
     mended: float
     zeros: tuple[JointReading, ...] = ()
-    rivals: tuple[str, ...] = ()
+    alternatives: tuple[str, ...] = ()
     unsigned: bool = False
     by_bodies: bool = False
 
@@ -96,8 +96,8 @@ class ChannelFault:
         turns = " and ".join(f"{_added(own)} on {joint}" for joint, own in each.items())
         lines = ", ".join(f"{joint}: {0.5 * math.pi * own.quarters:.5f}" for joint, own in each.items())
         said = f"position of {', '.join(each)} {verb} from another zero than the URDF: with {turns} {gain}"
-        if self.rivals:
-            said += f" (as it does with {', or with '.join(self.rivals)})"
+        if self.alternatives:
+            said += f" (as it does with {', or with '.join(self.alternatives)})"
         mend = ""
         for word, signal in (("position scale and offset", "position"), ("effort_gain", "effort")):
             own = [joint for joint, read in each.items() if signal in (read.signal or "")]
@@ -114,13 +114,13 @@ def faults_of(
     joints: Sequence[str],
     error: float,
     mended: float,
-    rivals: tuple[str, ...] = (),
+    alternatives: tuple[str, ...] = (),
 ) -> list[ChannelFault]:
     """Return the faults of a mapping that another reading mends."""
     wrong = {joint: own for joint, own in zip(joints, reading, strict=True) if own.quarters}
     found = []
     if wrong:
-        found.append(ChannelFault("position", tuple(wrong), False, error, mended, tuple(wrong.values()), rivals))
+        found.append(ChannelFault("position", tuple(wrong), False, error, mended, tuple(wrong.values()), alternatives))
     for signal in SIGNALS:
         own = tuple(
             joint for joint, read in zip(joints, reading, strict=True) if not read.quarters and read.signal == signal

@@ -30,7 +30,7 @@ class WrongZeros:
     Attributes
     ----------
     reading : tuple of JointReading
-    rivals : tuple of str
+    alternatives : tuple of str
         In words, what leaves as much and is as simple.
     error, mended : float
         See `ChannelFault`.
@@ -40,7 +40,7 @@ class WrongZeros:
     """
 
     reading: Reading
-    rivals: tuple[str, ...]
+    alternatives: tuple[str, ...]
     error: float
     mended: float
     left: float
@@ -49,7 +49,7 @@ class WrongZeros:
 
     def faults(self, joints: Sequence[str]) -> list[ChannelFault]:
         """Return what is wrong with the mapping."""
-        return faults_of(self.reading, joints, self.error, self.mended, self.rivals)
+        return faults_of(self.reading, joints, self.error, self.mended, self.alternatives)
 
 
 def wrong_zeros(
@@ -81,8 +81,8 @@ def wrong_zeros(
     found = _counted(held, before, pushing, most, rows, _common([chosen, *others])) if others else None
     if found is not None or len(others) > MAX_READINGS:
         return found
-    rivals = tuple(in_words(other, held.model.robot.joints) for other in others)
-    return _counted(held, before, pushing, most, rows, chosen, rivals)
+    alternatives = tuple(in_words(other, held.model.robot.joints) for other in others)
+    return _counted(held, before, pushing, most, rows, chosen, alternatives)
 
 
 def _counted(
@@ -92,7 +92,7 @@ def _counted(
     most: float,
     rows: FewRows,
     reading: Reading,
-    rivals: tuple[str, ...] = (),
+    alternatives: tuple[str, ...] = (),
 ) -> WrongZeros | None:
     """Return a reading with other zeros if it counts on all rows, and friction pushes on no more joints."""
     if not has_zeros(reading):
@@ -103,7 +103,7 @@ def _counted(
     pushed = np.count_nonzero(friction_pushes(weighted_value(other.by_joint), other))
     if said is None or pushed > np.count_nonzero(pushing):
         return None
-    return WrongZeros(reading, rivals, *said, mean(then[1]), mean(rows.left(reading)), other)
+    return WrongZeros(reading, alternatives, *said, mean(then[1]), mean(rows.left(reading)), other)
 
 
 def _simplest(tried: dict[Reading, float]) -> tuple[Reading, list[Reading]]:

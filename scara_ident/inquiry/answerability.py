@@ -2,7 +2,7 @@
 
 The columns are those of the model, then those of the effects in question, each with the change of its torque by its
 nonlinear parameters. Rows are weighted to have noise of variance one, so that what is left of a column, once others are
-projected out, is as long as the standard errors that it makes. Of rivals A and B with the torque ``A a`` that A has,
+projected out, is as long as the standard errors that it makes. Of confounders A and B with the torque ``A a`` that A has,
 
     t^2 = |(I - P) A a|^2,  P the projection on the model and B with all of its parameters
 
@@ -114,8 +114,8 @@ class Inquiry:
 
     def freed(self, item: Suspect) -> int:
         """Return of how many nonlinear parameters the change of its torque is asked for, as it may stand for another."""
-        rivals = {own.label for asked in self.questions if asked.kind == "rivals" for own in asked.suspects}
-        return len(item.candidate.effect.nonlinear) if item.label in self.labels_in_model | rivals else 0
+        confounders = {own.label for asked in self.questions if asked.kind == "confounders" for own in asked.suspects}
+        return len(item.candidate.effect.nonlinear) if item.label in self.labels_in_model | confounders else 0
 
     @cached_property
     def places(self) -> tuple[tuple[slice, slice], ...]:
@@ -223,7 +223,7 @@ class _View:
             return self._parameter(question)
         if question.kind == "unexplained":
             return self._shape(question)
-        if question.kind == "rivals":
+        if question.kind == "confounders":
             pairs = permutations(question.suspects, 2)
             names = {item.label for item in question.suspects}
             return min((self._apart(one, names, other) for one, other in pairs), default=0.0)

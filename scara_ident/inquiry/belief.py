@@ -248,13 +248,13 @@ def times_apart(
     owner = np.repeat(np.arange(len(others)), [inquiry.just_seen[item.label].shape[1] for item in others])
     nearest = np.full(len(others), np.inf)
     for k, item in enumerate(others):
-        rival = left[:, places[item.label][1]]
+        columns = left[:, places[item.label][1]]
         basis, singular, _ = np.linalg.svd(
-            rival / np.maximum(np.linalg.norm(rival, axis=0), 1e-300), full_matrices=False
+            columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300), full_matrices=False
         )
         basis = basis[:, singular > np.sqrt(_RANK)]
         apart = np.clip(whole - np.sum((basis.T @ torque) ** 2, axis=0), 0.0, None)
-        # Of more squares than a rival may leave none is taken for another.
+        # Of more squares than another may leave none is taken for another.
         far = np.divide(apart, (1.0 - criteria.min_share) * whole, out=np.zeros(len(whole)), where=whole > 0.0)
         squares = np.maximum(apart / (2.0 * criteria.alike) ** 2, far)
         inverse = np.divide(1.0, squares, out=np.full(len(whole), np.inf), where=squares > 0.0)

@@ -19,7 +19,7 @@ from scara_ident.threads import one_blas_thread
 # A motion that is designed to tell, s, and how that is asked for.
 ASKED_SECONDS, ASKED_MOTION = 15.0, "excite --tell"
 # Kinds of questions whose motions come before recordings of another kind.
-URGENT = ("rivals", "unexplained")
+URGENT = ("confounders", "unexplained")
 # Effects of which more could be said, and joints that are named of each.
 MOST, MAX_LABELS = 4, 3
 # By diagnosis: its file, its report and its story in words all hold them, and they take all its recordings.

@@ -20,9 +20,9 @@ from scara_ident.errors import ScaraIdentError
 from scara_ident.inquiry.shape import shape_over
 from scara_ident.manners import listed
 
-Kind = Literal["rivals", "unexplained", "below_limit", "parameter"]
-# Rivals of one effect, and candidates that these recordings would hardly have shown: of each family, in all, and by name.
-MAX_RIVALS, MAX_PER_FAMILY, MAX_BELOW_LIMIT, MAX_NAMED = 4, 2, 24, 3
+Kind = Literal["confounders", "unexplained", "below_limit", "parameter"]
+# Confounders of one effect, and candidates that these recordings would hardly have shown: of each family, in all, and by name.
+MAX_CONFOUNDERS, MAX_PER_FAMILY, MAX_BELOW_LIMIT, MAX_NAMED = 4, 2, 24, 3
 # Of one suspect against another, at most.
 MAX_ODDS = 100.0
 # What tells a remainder that no signal of the motion is known to make.
@@ -75,13 +75,13 @@ class Question:
 
     Attributes
     ----------
-    kind : {"rivals", "unexplained", "below_limit", "parameter"}
+    kind : {"confounders", "unexplained", "below_limit", "parameter"}
         Which of some effects it is; what a remainder looks like; whether effects of a size are there; how large a
         parameter is.
     text : str
         For a person.
     suspects : tuple of Suspect
-        The effects in question; of rivals the first is the one in the model.
+        The effects in question; of confounders the first is the one in the model.
     joint : str or None
         Whose remainder it is.
     signals : tuple of str
@@ -176,7 +176,7 @@ def questions(diagnosis: Diagnosis) -> tuple[Question, ...]:
     First effects that were found and may be another, then a remainder, then effects that are worth a look, then what these
     recordings would have shown least of, and last parameters that are hardly known.
     """
-    found = [*_rivals(diagnosis), *_remainder(diagnosis), *_worth_a_look(diagnosis)]
+    found = [*_confounders(diagnosis), *_remainder(diagnosis), *_worth_a_look(diagnosis)]
     asked = {item.label for question in found for item in question.suspects}
     return tuple([*found, *_below_limit(diagnosis, asked), *_parameters(diagnosis)])
 
@@ -194,20 +194,20 @@ def suspects_in_model(diagnosis: Diagnosis) -> tuple[Suspect, ...]:
     return tuple(result)
 
 
-def _rivals(diagnosis: Diagnosis) -> Iterator[Question]:
+def _confounders(diagnosis: Diagnosis) -> Iterator[Question]:
     own = {item.candidate: item for item in suspects_in_model(diagnosis)}
     asked: set[frozenset[str]] = set()
     for effect in sorted(diagnosis.effects, key=lambda item: -item.gain):
         if effect.candidate not in own or effect.candidate is None:
             continue
         first = own[effect.candidate]
-        others = [item for item in effect.confounded_with if item.value and _moves(item.candidate)][:MAX_RIVALS]
+        others = [item for item in effect.confounded_with if item.value and _moves(item.candidate)][:MAX_CONFOUNDERS]
         suspects = (first, *(Suspect(item.candidate, item.label, item.value) for item in others))
         labels = frozenset(item.label for item in suspects)
         if others and _moves(first.candidate) and labels not in asked:
             asked.add(labels)
             text = " or ".join(item.label for item in suspects)
-            yield Question("rivals", text, suspects, experiment=first.candidate.effect.experiment)
+            yield Question("confounders", text, suspects, experiment=first.candidate.effect.experiment)
 
 
 def _remainder(diagnosis: Diagnosis) -> Iterator[Question]:

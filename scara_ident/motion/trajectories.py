@@ -73,8 +73,8 @@ def trajectories_of(stretches: Sequence[Stretch]) -> Trajectories:
     order = sorted(range(len(groups)), key=lambda g: (-len(groups[g]), min(stretches[k].name for k in groups[g])))
     for g in order:
         names = sorted(stretches[k].name for k in groups[g])
-        rivals = [other for other in order if other != g and wanted[other] == wanted[g]]
-        own = all(len(groups[other]) < len(groups[g]) for other in rivals)
+        competing = [other for other in order if other != g and wanted[other] == wanted[g]]
+        own = all(len(groups[other]) < len(groups[g]) for other in competing)
         label = wanted[g] if own else names[0]
         while label in taken:
             label += "'"

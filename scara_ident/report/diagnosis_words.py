@@ -49,7 +49,7 @@ def _others(diagnosis: Diagnosis) -> list[str]:
         found += _found(effect, diagnosis)
         found += [_directly(name, parameter, effect.parameters[name]) for name, parameter in effect.direct.items()]
         if effect.confounded_with:
-            others = ", ".join(effect.rival_names(diagnosis.search.scene))
+            others = ", ".join(effect.confounder_names(diagnosis.search.scene))
             found.append(f"These recordings cannot tell it from: {others}.")
     if diagnosis.verdict == "undecided":
         found += [*_to_do_first(diagnosis), *_not_shown(diagnosis.evidence)]

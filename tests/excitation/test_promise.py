@@ -87,7 +87,7 @@ class Slow(TorqueRipple):
     orders = (0.1,)
 
 
-@pytest.mark.parametrize("kind", ["rivals", "below_limit"])
+@pytest.mark.parametrize("kind", ["confounders", "below_limit"])
 def test_of_what_the_motion_holds_too_few_periods_to_be_tried_is_named(kind: Kind):
     found, small, wide = open_diagnosis(), wide_motion(0.1), wide_motion()
     ripple = Suspect(Candidate(Slow(), Member(0, Slow.orders)), "ripple of joint1", (0.05, 0.0))

@@ -30,7 +30,7 @@ def test_zeros_by_quarter_turns_are_told(quarters: tuple[int, ...]) -> None:
     robot = arm()
     faults = channel_faults(seen(robot, runs(robot, quarters)))
     assert told(faults) == [{str(k + 2): turn for k, turn in enumerate(quarters) if turn}]
-    assert faults[0].rivals == () and faults[0].mended < 0.2 * faults[0].error
+    assert faults[0].alternatives == () and faults[0].mended < 0.2 * faults[0].error
 
 
 def test_what_leaves_as_much_is_named() -> None:
@@ -38,7 +38,7 @@ def test_what_leaves_as_much_is_named() -> None:
     robot = arm()
     (fault,) = channel_faults(seen(robot, runs(robot, (0, 0, 2, 0))))
     assert told((fault,)) == [{"4": 2}]
-    assert fault.rivals == ("effort and position of j2s6s200_joint_5 of opposite sign",)
+    assert fault.alternatives == ("effort and position of j2s6s200_joint_5 of opposite sign",)
     assert "(as it does with effort and position of" in str(fault)
 
 

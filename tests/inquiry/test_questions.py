@@ -23,7 +23,7 @@ from tests.inquiry.asked import PAIR, coarse_diagnosis, open_diagnosis
 
 def test_an_effect_that_may_be_another_is_asked_for_first():
     first = questions(open_diagnosis())[0]
-    assert first.kind == "rivals" and first.text == PAIR
+    assert first.kind == "confounders" and first.text == PAIR
     spring, tilt = first.suspects
     assert spring == suspects_in_model(open_diagnosis())[0]
     # Both are of a size that the recordings have: the tilt's gravity for the spring's torque.

@@ -195,7 +195,7 @@ def test_a_rival_of_its_own_name_is_told_from_it(result):
     found = replace(
         result.effects[0], effect=carried.name, joint=None, description="a payload in a", confounded_with=rivals
     )
-    assert found.rival_names(result.search.scene) == (
+    assert found.confounder_names(result.search.scene) == (
         "payload_change (a payload of unknown mounting taken up or put down in the run)",
         "spring of joint2",
     )

@@ -24,8 +24,8 @@ from scara_ident.errors import RecordingError
 from scara_ident.estimation.noise_bias import OF_LAG, noisy
 from scara_ident.estimation.run_offsets import offsets_on
 
-# A fit that leaves so many times as much is no rival, whatever rows will weigh in the end.
-RIVAL = 2.0
+# A fit that leaves so many times as much is no alternative, whatever rows will weigh in the end.
+ALTERNATIVE = 2.0
 # Fits whose nonlinear parameters differ by no larger share ended in the same minimum: so near do coarse ones come to it.
 SAME = 0.05
 
@@ -51,12 +51,15 @@ def lowest(step: SelectionStep) -> SelectionStep:
     if len(_together(first)) < 2:
         return first
     best = _Fit(replace(first, minima=()), linearise(first).error)
-    rivals = _rivals(best)
-    if rivals and rivals[0].near(best):
-        other = _fitted(rivals[0].step)
+    alternatives = _alternatives(best)
+    if alternatives and alternatives[0].near(best):
+        other = _fitted(alternatives[0].step)
         if other.error < (1.0 - RISE) * best.error:
-            best, rivals = other, [each for each in (best, *rivals[1:]) if each.error < RIVAL * other.error]
-    return replace(best.step, minima=tuple(_acting(each.step) for each in (best, *rivals)))
+            best, alternatives = (
+                other,
+                [each for each in (best, *alternatives[1:]) if each.error < ALTERNATIVE * other.error],
+            )
+    return replace(best.step, minima=tuple(_acting(each.step) for each in (best, *alternatives)))
 
 
 def as_good(step: SelectionStep) -> Iterator[SelectionStep]:
@@ -70,7 +73,7 @@ def as_good(step: SelectionStep) -> Iterator[SelectionStep]:
         return
     if len(places) > 1:
         own = _Fit(step, linearise(step).error)
-        yield from (each.step for each in _rivals(own) if each.near(own) and _alike(step, each.step, places))
+        yield from (each.step for each in _alternatives(own) if each.near(own) and _alike(step, each.step, places))
         below = _below(step)
         if below is not None and _others(step, below, places):
             yield below
@@ -112,21 +115,21 @@ def _fitted(step: SelectionStep, *, coarse: bool = False) -> _Fit:
     return _Fit(found, linearise(found).error)
 
 
-def _rivals(own: _Fit) -> list[_Fit]:
+def _alternatives(own: _Fit) -> list[_Fit]:
     """Return other coarse fits that leave not much more than one's own, the best first.
 
     They began with one of several effects elsewhere, or where those of the same effects ended.
     """
     step = own.step
     if _of_these(step):
-        found = [_fitted(begun, coarse=True) for begun in _at_rivals(step)]
+        found = [_fitted(begun, coarse=True) for begun in _at_alternatives(step)]
     else:
         part = on_part(step)
         ends = [tune(begun, coarse=True) for begun in _elsewhere(part)]
         found = [_Fit(end, linearise(end).error) for end in (on_all(end, step) for end in ends)]
         if part is not step:
-            found = [_fitted(each.step, coarse=True) for each in found if each.error < RIVAL * own.error]
-    found = [each for each in found if each.error < RIVAL * own.error and not _same(each.step, step)]
+            found = [_fitted(each.step, coarse=True) for each in found if each.error < ALTERNATIVE * own.error]
+    found = [each for each in found if each.error < ALTERNATIVE * own.error and not _same(each.step, step)]
     return sorted(found, key=lambda each: each.error)
 
 
@@ -142,7 +145,7 @@ def _of_these(step: SelectionStep) -> bool:
     return own == known
 
 
-def _at_rivals(step: SelectionStep) -> Iterator[SelectionStep]:
+def _at_alternatives(step: SelectionStep) -> Iterator[SelectionStep]:
     for each in step.minima[1:]:
         chosen: tuple[Candidate, ...] = step.chosen
         for place, item in zip(_together(step), each, strict=True):

@@ -119,8 +119,10 @@ def best_first(pairs: Sequence[tuple[SelectionStep, Decision]]) -> list[tuple[Se
     beside = replace(step, chosen=(*step.chosen, best.candidate))
     again = beside.judge([item.candidate for _, item in near]) if near else []
     little = 1.0 - step.criteria.min_share
-    rivals = [pair for pair, item in zip(near, again, strict=True) if _saved(beside, item) < little * _saved(*pair)]
-    variation = counted(step, best).variation if rivals else None
+    alternatives = [
+        pair for pair, item in zip(near, again, strict=True) if _saved(beside, item) < little * _saved(*pair)
+    ]
+    variation = counted(step, best).variation if alternatives else None
     if variation is None:
         return order
 
@@ -128,7 +130,7 @@ def best_first(pairs: Sequence[tuple[SelectionStep, Decision]]) -> list[tuple[Se
         (again,) = replace(pair[0], variation=variation).judge([pair[1].candidate])
         return again.examination.held_out
 
-    first = max([order[0], *rivals], key=removed)
+    first = max([order[0], *alternatives], key=removed)
     return [first, *(pair for pair in order if pair is not first)]
 
 

@@ -126,11 +126,11 @@ def outdone(found: Search, weights: Array, refused: Sequence[Decision]) -> list[
     """
     step = replace(found.step, weights=weights)
     # What turns within a step of the encoder is not there: it mends friction's sign, as some of what is there does too.
-    rivals = [item.candidate for item in refused if within_a_step(step, item.candidate) is None]
+    alternatives = [item.candidate for item in refused if within_a_step(step, item.candidate) is None]
     result = []
-    for place, candidate in enumerate(step.chosen if rivals else ()):
+    for place, candidate in enumerate(step.chosen if alternatives else ()):
         beside = step.without(place)
-        own, *others = beside.judge([candidate, *rivals])
+        own, *others = beside.judge([candidate, *alternatives])
         enough = step.criteria.min_share * own.examination.held_out
         best = max(others, key=lambda item: item.examination.held_out)
         if best.examination.held_out >= enough:
@@ -166,9 +166,9 @@ def beaten_by_its_like(found: Search, weights: Array) -> list[Decision]:
         near = [item for item in best_of_each(others).values() if item.examination.held_out > enough]
         near.sort(key=lambda item: -item.examination.held_out)
         for item in near[: criteria.max_fitted]:
-            rival, decision = fitted_with(beside, item.candidate)
+            alternative, decision = fitted_with(beside, item.candidate)
             less = float(np.sum(own.examination.left) - np.sum(decision.examination.left))
-            if less > 0.0 and not same((beside, own), (rival, decision)):
+            if less > 0.0 and not same((beside, own), (alternative, decision)):
                 result.append(own.refused(f"{item.label} explains more in its place"))
                 break
     return result
@@ -185,7 +185,7 @@ def beaten_by_impossible(found: Search, weights: Array) -> list[Decision]:
         See `unsettled`.
     """
     step, criteria = replace(found.step, weights=weights), found.step.criteria
-    rivals = [
+    alternatives = [
         item
         for item in best_of_each(found.decisions).values()
         if item.examination.p_value * found.tried <= criteria.family_error
@@ -193,8 +193,8 @@ def beaten_by_impossible(found: Search, weights: Array) -> list[Decision]:
         and hopeless(item, found.scene, criteria) is not None
     ]
     result = []
-    for place, candidate in enumerate(step.chosen if rivals else ()):
-        near = [item.candidate for item in rivals if item.candidate.member.joint == candidate.member.joint]
+    for place, candidate in enumerate(step.chosen if alternatives else ()):
+        near = [item.candidate for item in alternatives if item.candidate.member.joint == candidate.member.joint]
         if near:
             beside = step.without(place)
             own, *others = beside.judge([candidate, *near])
@@ -272,9 +272,9 @@ def superfluous(found: Search, weights: Array, others: Sequence[Decision]) -> li
         what = other.candidate.effect.description(step.scene, other.candidate.member)
         with_it = replace(step, chosen=(*step.chosen, other.candidate))
         for place, candidate in enumerate(step.chosen):
-            own, rival = step.without(place).judge([candidate, other.candidate])
+            own, alternative = step.without(place).judge([candidate, other.candidate])
             (left,) = with_it.without(place).judge([candidate])
-            if rival.examination.held_out > own.examination.held_out and not left.accepted:
+            if alternative.examination.held_out > own.examination.held_out and not left.accepted:
                 result.append(
                     own.refused(f"{what}, of which the recordings hold too little, explains more in its place")
                 )

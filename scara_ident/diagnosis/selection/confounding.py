@@ -84,21 +84,26 @@ def _cancelling(step: SelectionStep) -> list[tuple[Confounder, ...]]:
         torques.append({joint: own - np.mean(own) for joint, own in torque.items()})
         start += count
     for place, (own, candidate) in enumerate(zip(torques, step.chosen, strict=True)):
-        for other, rival in zip(torques, step.chosen, strict=True):
+        for other, other_effect in zip(torques, step.chosen, strict=True):
             joint = candidate.member.joint
-            if other is own or joint is None or joint != rival.member.joint or not set(own) == set(other) == {joint}:
+            if (
+                other is own
+                or joint is None
+                or joint != other_effect.member.joint
+                or not set(own) == set(other) == {joint}
+            ):
                 continue
             least = min(np.linalg.norm(own[joint]), np.linalg.norm(other[joint]))
             if np.linalg.norm(own[joint] + other[joint]) < step.criteria.cancels * least:
-                label, name = rival.label(step.scene), rival.effect.name
-                found[place] += (Confounder(label, name, rival.joint(step.scene), 0.0, rival, ()),)
+                label, name = other_effect.label(step.scene), other_effect.effect.name
+                found[place] += (Confounder(label, name, other_effect.joint(step.scene), 0.0, other_effect, ()),)
     return found
 
 
 def _confounders_of(
     step: SelectionStep, found: Candidate, pool: Sequence[Candidate], first: Scene, doubtful: Sequence[Candidate]
 ) -> tuple[Confounder, ...]:
-    # A rival is asked for once, not in every round of a search, and need not be believed itself: how many others were tried
+    # A confounder is asked for once, not in every round of a search, and need not be believed itself: how many others were tried
     # says nothing of whether these two can be told apart. One of the whole arm need not remove as much as all joints leave.
     scene, of_one = step.scene, replace(step.criteria, family_error=step.criteria.significant)
     criteria = replace(of_one, min_gain=of_one.min_gain / scene.robot.n)

@@ -68,7 +68,7 @@ def best_exchange(
         beside = step.without(place)
         (own,) = beside.judge([item])
         least = ROUNDING * float(np.sum(beside.model.squares))
-        for other, decision in _fitted_rivals(beside, own, able, first):
+        for other, decision in _fitted_alternatives(beside, own, able, first):
             saved = float(np.sum(own.examination.left) - np.sum(decision.examination.left))
             saved = saved if abs(saved) > least else 0.0
             alike = same((beside, own), (other, decision))
@@ -116,7 +116,7 @@ def near_in_place(step: SelectionStep, found: Decision, pool: Sequence[Candidate
     return list(best_of_each(step.judge(enough([*alike, *others], step.scene, least))).values())
 
 
-def _fitted_rivals(
+def _fitted_alternatives(
     beside: SelectionStep, own: Decision, pool: Sequence[Candidate], first: Scene
 ) -> list[tuple[SelectionStep, Decision]]:
     """Return those that come near an effect in its place once they are refined, with all else fitted with them."""

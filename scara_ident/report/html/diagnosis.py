@@ -175,9 +175,9 @@ def _effect_words(effect: FoundEffect, context: DiagnosisContext) -> list[Block]
         blocks += [Paragraph("It acts in these intervals:"), _interval_table(found)]
     if effect.confounded_with:
         others = ", ".join(
-            f"{rival} (would remove {confounder.gain:.0%} in its place)"
-            for rival, confounder in zip(
-                effect.rival_names(context.diagnosis.search.scene), effect.confounded_with, strict=True
+            f"{name} (would remove {confounder.gain:.0%} in its place)"
+            for name, confounder in zip(
+                effect.confounder_names(context.diagnosis.search.scene), effect.confounded_with, strict=True
             )
         )
         blocks.append(Paragraph(f"These recordings cannot tell it from: {others}."))
@@ -275,7 +275,7 @@ def _unknowable(context: DiagnosisContext) -> list[Block]:
     """Effects that these recordings, or any, cannot tell from another."""
     effects = context.diagnosis.effects
     groups = [
-        " | ".join((effect.title, *dict.fromkeys(effect.rival_names(context.diagnosis.search.scene))))
+        " | ".join((effect.title, *dict.fromkeys(effect.confounder_names(context.diagnosis.search.scene))))
         for effect in effects
         if effect.confounded_with
     ]

@@ -117,7 +117,7 @@ def test_what_differs_in_the_lower_part_of_the_band_is_in_the_standard_deviation
     own = physical_parameters(step).effects[1]["stiffness"]
     softer = replace(step, chosen=(step.chosen[0], step.chosen[1].at((6.0, 0.03))))
     module = sys.modules[lowest.__module__]
-    monkeypatch.setattr(module, "_rivals", lambda _: [])
+    monkeypatch.setattr(module, "_alternatives", lambda _: [])
     # Of the same fits each time.
     monkeypatch.setattr(sys.modules[parameters_of_laws.__module__], "physical_parameters", cache(physical_parameters))
     for below, far in ((softer, True), (step, False), (None, False)):
