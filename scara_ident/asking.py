@@ -1,4 +1,4 @@
-"""The loop of measuring and asking, kept in a folder: recordings so far, what they tell, and the motion to record next.
+"""The loop of measuring and asking, kept in a folder: the recordings so far, what they determine, and the motion to record next.
 
 Every step is written whole before the note that it is done, and a step depends on what lies in the folder alone. So a run
 that is stopped at any moment is gone on with by the next, and one that finds nothing new changes nothing.

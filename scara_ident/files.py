@@ -1,4 +1,4 @@
-"""Results on disk, whole or not at all; and what is no file to read from."""
+"""Results on disk, written whole or not at all, and checks of what can be read from."""
 
 from __future__ import annotations
 

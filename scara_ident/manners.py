@@ -1,4 +1,4 @@
-"""How what users hold in their hands behaves: short to print, safe to copy and to send, and not to be changed."""
+"""How results behave in a user's hands: short to print, safe to copy and to pickle, and immutable."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How much memory reading a file may take, in one place: a small file can unpack to more than the machine has.
+"""The limit of memory that reading a file may take: a small file can unpack to more than the machine has.
 
 And how much the C library keeps of what was freed: the system clears each page that it gives, which for arrays that live
 shortly takes as long as to fill them.

@@ -1,4 +1,4 @@
-"""What is said while work goes on: the step that runs, the share that is done, and what was found on the way."""
+"""Progress of long work: the step that runs, the share that is done, and what was found so far."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What libraries of other languages write to the error stream is kept from the user, who gets one line instead."""
+"""Error-stream output of native libraries is kept from the user, who gets one line instead."""
 
 from __future__ import annotations
 

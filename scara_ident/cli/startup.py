@@ -1,4 +1,4 @@
-"""What lets a command begin and end sooner; nothing of it changes a result."""
+"""Faster start and end of a command; no result depends on it."""
 
 from __future__ import annotations
 

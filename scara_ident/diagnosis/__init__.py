@@ -1,4 +1,4 @@
-"""Close the loop: what the model lacks, traced to physics."""
+"""Close the loop: what the model lacks, traced to a physical effect."""
 
 from scara_ident.diagnosis.diagnose import Diagnosis, diagnose
 from scara_ident.diagnosis.evidence.outcome import Unexplained

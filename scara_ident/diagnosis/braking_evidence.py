@@ -1,4 +1,4 @@
-"""Whether friction brakes: where it pushes the model lacks something that it stands for, be what is left noise or not."""
+"""Whether friction dissipates: where it drives the joint, the model lacks something that friction stands for, whether the residual is noise or not."""
 
 from __future__ import annotations
 

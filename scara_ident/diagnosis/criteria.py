@@ -1,4 +1,4 @@
-"""Every decision of the diagnosis that a number stands behind."""
+"""Every threshold of the diagnosis, with unit, reason and source."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The whole story: what the residual lacks, what it is traced to, and the error before and after."""
+"""The diagnosis as a whole: what the residual contains, which effect it is traced to, and the error before and after."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which of several searches is believed: in which band, whether what is left is noise, which effects stand for others."""
+"""Which of several searches is believed: the band, whether the residual is noise, which effects are proxies."""
 
 from __future__ import annotations
 

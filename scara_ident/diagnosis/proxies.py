@@ -1,4 +1,4 @@
-"""Effects that stand for what is not in the catalogue: they remove little of a remainder most of which stays."""
+"""Proxies: effects that stand for one outside the catalogue, because they remove little of a residual most of which stays."""
 
 from __future__ import annotations
 

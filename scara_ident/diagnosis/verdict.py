@@ -1,4 +1,4 @@
-"""The verdict, and whether what is left on each joint was shown to be noise once all that speaks against it is heard."""
+"""The verdict, and whether the residual of each joint is noise once all evidence is considered."""
 
 from __future__ import annotations
 

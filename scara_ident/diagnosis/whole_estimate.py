@@ -1,4 +1,4 @@
-"""The estimate of a model with effects as it is reported: as unsure as all that was fitted with its parameters leaves them.
+"""The estimate of a model with effects as it is reported, with the uncertainty of everything that was fitted with it.
 
 A fit of columns that are held knows nothing of what nonlinear parameters take up, nor of columns that follow the estimate. The
 model that is linear in all of these does, and the parameters of effects come from it: so do all others.

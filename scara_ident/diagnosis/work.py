@@ -1,4 +1,4 @@
-"""Which share of a diagnosis its steps take, for whoever watches: no decision rests on it."""
+"""Progress of a diagnosis: the share of the work that each step takes; no decision depends on it."""
 
 from __future__ import annotations
 

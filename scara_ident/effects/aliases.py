@@ -1,4 +1,4 @@
-"""Effects that a model absorbs exactly, whatever the arm does: not absent but invisible.
+"""Aliases: effects that a model absorbs exactly, whatever the arm does, and so cannot be excluded.
 
 Nothing here is taken from a list of what is known of some arm: the columns of each effect are computed on random
 states of the robot at hand and projected on the model's own.

@@ -1,4 +1,4 @@
-"""A compact weight carried in some recordings: what is tried in the place of a body that comes out as none."""
+"""A point-like payload carried in some recordings: tested in the place of a body that comes out as physically impossible."""
 
 from __future__ import annotations
 

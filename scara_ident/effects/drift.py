@@ -1,4 +1,4 @@
-"""What changes slowly in a run: friction that warms up, an offset that drifts."""
+"""Slow changes within a run: friction that warms up, an offset that drifts."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Links that do not follow their motors: elastic gears and clearance."""
+"""Joint elasticity and backlash: links that do not follow their motors."""
 
 from __future__ import annotations
 

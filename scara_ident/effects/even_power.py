@@ -1,4 +1,4 @@
-"""Which power of a parameter the data tell: that about which its uncertainty is even.
+"""The Box-Cox power of a parameter in which its uncertainty is even.
 
 Of a gear too stiff to be seen swinging the torque tells the compliance, of which the stiffness is the power -1: where the compliance
 may be all but nothing, the stiffness has no upper end. A power of 1 is the parameter itself, 0 its logarithm, as of a distance that

@@ -1,4 +1,4 @@
-"""How the torque of effects whose columns follow the estimate changes with the parameters that they follow.
+"""Effects whose columns depend on the estimate: how their torque changes with the parameters that they depend on.
 
 Such a torque is a product of coefficients and of the base model's parameters, and both are estimated. The columns say how it
 changes with the coefficients. How it changes with the parameters is said here: what is unsure of these is then in what is

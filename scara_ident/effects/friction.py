@@ -1,4 +1,4 @@
-"""Friction beyond a polynomial of the joint's own speed: at low speed, by direction, by position, of other joints."""
+"""Friction beyond a polynomial of the joint's own speed: Stribeck, asymmetric, by position, by other joints."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Losses of the gear that grow with the torque that it transmits."""
+"""Transmission losses that grow with the transmitted torque."""
 
 from __future__ import annotations
 

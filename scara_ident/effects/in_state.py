@@ -1,4 +1,4 @@
-"""Whether an effect's torque follows from the present position, velocity and acceleration alone.
+"""Whether an effect's torque is a function of the present position, velocity and acceleration alone.
 
 It is tried, not declared: a family of somebody's own package cannot be wrong about it.
 """

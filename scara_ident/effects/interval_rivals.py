@@ -1,4 +1,4 @@
-"""What else may change where a body seems to act: offsets, friction, the torque's scale, or a force on the tool.
+"""Alternatives to a body that seems to act in intervals: offsets, friction, torque scale, a force on the tool.
 
 Offsets and the force are others in each interval, for jumps and contacts are; they cost as many parameters.
 """

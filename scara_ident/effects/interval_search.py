@@ -1,4 +1,4 @@
-"""In which intervals of recordings the last link carries a body, by the torque alone, and what it is.
+"""Intervals of recordings in which the last link carries a body, by the torque alone, and the body's parameters.
 
 One body, in any number of intervals of any recordings, beside the base model that all share and offsets of each recording's
 own. Where the body is known, each cell of time says by how much the torque is likelier with it than without, and the

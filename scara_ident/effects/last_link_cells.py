@@ -1,4 +1,4 @@
-"""What short cells of time say of a body on the last link, beside the base model and offsets of each recording's own.
+"""Information of short cells of time on a body on the last link, beside the base model and per-recording offsets.
 
 Of each cell only products of the body's columns are kept, and of all recordings together those of the base model: nothing
 grows with the number of samples, and with the number of cells only what a body's few columns need.

@@ -1,4 +1,4 @@
-"""What the rigid bodies of an arm do when gravity, a payload or a joint's position is not what the model takes."""
+"""Rigid-body torques when gravity, a payload or a joint's position differs from what the model takes."""
 
 from __future__ import annotations
 

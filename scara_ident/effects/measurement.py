@@ -1,4 +1,4 @@
-"""What the measurement of torque does wrong: it bends, it is scaled, it is late."""
+"""Errors of the torque measurement: nonlinearity, wrong scale, delay."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the last link carries, and what balances the links."""
+"""Payloads on the last link, and counterweights on the links."""
 
 from __future__ import annotations
 

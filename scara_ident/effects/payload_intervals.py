@@ -1,4 +1,4 @@
-"""What the last link takes up and puts down, as often as it does, in any of the recordings."""
+"""Payloads taken up and put down in any of the recordings, as often as it happens."""
 
 from __future__ import annotations
 

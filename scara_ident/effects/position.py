@@ -1,4 +1,4 @@
-"""Torques that depend on where the arm is."""
+"""Torques that depend on the arm's position."""
 
 from __future__ import annotations
 

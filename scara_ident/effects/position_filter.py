@@ -1,4 +1,4 @@
-"""What is left of a filter of the positions once its delay was taken out of the recordings."""
+"""What remains of a filter of the positions once its delay was corrected."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Effort that is late by another time in each recording."""
+"""Delays of the effort that differ from recording to recording."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which recordings the last link carries something in that it does not in others, by their torque alone.
+"""Groups of recordings in which the last link carries different bodies, by their torque alone.
 
 Each recording says, beside the base model that all share, what mass and first moments its last link has more than in the
 others. Recordings that agree are joined, the most alike first by the distance of Mahalanobis (Ward 1963). Where two groups

@@ -1,4 +1,4 @@
-"""Which joints' torques say something of each other's scale: those that share parameters of the bodies."""
+"""Joints whose torque scales can be compared: those that share parameters of the bodies."""
 
 from __future__ import annotations
 

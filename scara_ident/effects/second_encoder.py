@@ -1,4 +1,4 @@
-"""What an encoder behind the gear says by itself: how far the gear yields under the torque of its motor.
+"""The stiffness of a gear by an encoder behind it, without a fit.
 
 The motor's own row of the equations of motion has nothing of the links in it (Spong 1987): with the lag x of the link,
 motor less link,

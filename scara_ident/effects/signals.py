@@ -1,4 +1,4 @@
-"""What effects are made of: signals of a stretch of motion, computed once for all of them."""
+"""Signals of a stretch of motion that effects are made of, each computed once."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether a model's columns carry an effect whatever the arm does, seen on random states."""
+"""Whether a model's columns span those of an effect at all states, tested on random ones."""
 
 from __future__ import annotations
 

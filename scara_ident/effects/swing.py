@@ -1,4 +1,4 @@
-"""Links that swing in their gears: how torques drive them, and how they swung when a recording began.
+"""Oscillation of links behind elastic gears: how torques drive it, and its initial state in a recording.
 
 The lags x of m links behind their motors obey ``inertia x'' + damping x' + stiffness x = torque`` with matrices of shape
 (m, m): a link that swings loads the gears of the others by its inertia.

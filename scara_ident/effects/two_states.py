@@ -1,4 +1,4 @@
-"""When something acts and when it does not, by what cells of time say for it and by how seldom it changes.
+"""Segmentation of time into two states, by the likelihood of cells and a penalty for each change.
 
 Of all ways to be in one of two states the likeliest, by dynamic programming (Viterbi 1967), and how sure its instants are.
 """

@@ -1,4 +1,4 @@
-"""By how much a run that no parameter saw differs from a model, where runs were found to differ."""
+"""How much an unseen run differs from a model, where runs were found to differ."""
 
 from __future__ import annotations
 

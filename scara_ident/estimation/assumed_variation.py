@@ -1,4 +1,4 @@
-"""How runs would differ that are too few to say so."""
+"""Assumed variation between runs, where there are too few to estimate it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which recordings are of one day, by the zeros of their torque sensors, and what so few days tell."""
+"""Which recordings are of one day, by the zeros of their torque sensors, and the freedom of so few days."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How far up a hardly filtered motion explains the torque: powers in bins of frequency, of it and of what fits leave of it."""
+"""Up to which frequency a hardly filtered motion explains the torque: power of torque and of residual in bins."""
 
 from __future__ import annotations
 

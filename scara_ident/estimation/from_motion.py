@@ -1,4 +1,4 @@
-"""From motion and torque that are at hand as arrays to what they say of a model, in memory that does not grow with them."""
+"""From motion and torque as arrays to the information on a model, in memory that does not grow with them."""
 
 from __future__ import annotations
 

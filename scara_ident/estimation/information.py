@@ -1,4 +1,4 @@
-"""What rows of a linear model say about its parameters: the triangular factor of [regressor | torque].
+"""Information of rows of a linear model: the triangular factor of [regressor | torque].
 
 For rows ``W`` and right-hand side ``u``, the factor R of the QR decomposition of ``[W | u]`` is a sufficient
 statistic: every least-squares quantity of any sub-model follows from R and the number of rows. Factors of

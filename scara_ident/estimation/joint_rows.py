@@ -1,4 +1,4 @@
-"""Rows of one joint's equation in blocks of time, and how many of them are made few without losing what they say."""
+"""Rows of one joint's equation in blocks of time, and their compression without loss of information."""
 
 from __future__ import annotations
 

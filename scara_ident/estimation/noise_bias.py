@@ -1,4 +1,4 @@
-"""What the noise of positions does to estimated parameters.
+"""The bias of estimated parameters by position noise.
 
 Velocities and accelerations stand in the regressor with their noise, which makes least squares err to one side however
 much is recorded. With the noise twice the estimate moves by as much again (Cook and Stefanski 1994); that this is more

@@ -1,4 +1,4 @@
-"""What recordings say of a model: its columns on prepared data, joint by joint and block by block of time.
+"""Observations: a model's columns on prepared data, joint by joint and block by block of time.
 
 A joint's rows hold only the columns that act on it. Each row is weighted to stand for all samples that the band makes
 dependent on it, so that `Information.rows` counts samples. All that an estimate needs follows from triangular factors

@@ -1,4 +1,4 @@
-"""Where identified friction pushes: a law that gives energy within the speeds recorded is no joint's, however well it fits."""
+"""Where identified friction drives the joint: a law that supplies energy within the recorded speeds is not friction."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How far up the motion would explain the torque once a further motion is recorded."""
+"""Up to which frequency the motion would explain the torque once a further motion is recorded."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a model leaves of the torque at every sample, within the bands that the estimate used."""
+"""Residuals at every sample, within the bands that the estimate used."""
 
 from __future__ import annotations
 

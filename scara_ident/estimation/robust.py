@@ -1,4 +1,4 @@
-"""A fit that no single stretch of time can steer, beside least squares.
+"""A robust fit, which no single stretch of time can steer, beside least squares.
 
 Each joint's rows in each block of time have a weight by their rms residual d, in units of the joint's noise floor (the
 median over blocks): Huber's first, min(1, c / d), then Tukey's bisquare, (1 - (d / k)^2)^2, which gives up what is far off

@@ -1,4 +1,4 @@
-"""Rows on which offsets that differ from run to run are the noise that they are.
+"""Rows in which offsets that differ from run to run are part of the noise (generalised least squares).
 
 One offset for all runs leaves each run's own to be explained by something else: gravity, where motions differ. Generalised
 least squares (Aitken 1936) takes them for draws of a variance, so that a run says little of its mean torque and all it knows

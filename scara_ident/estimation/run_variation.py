@@ -1,4 +1,4 @@
-"""How recordings differ from one another beyond noise: friction, torque scale, offset and delay of each run.
+"""Run variation: how recordings differ beyond noise in friction, torque scale, offset and delay.
 
 An arm is not quite the same from run to run and from day to day. What a run has more of than the others acts through the
 whole of it, so that blocks of one run say the same and their scatter knows nothing of it. Each kind of difference has a

@@ -1,4 +1,4 @@
-"""A model's columns at every sample of recordings: held, or of more samples than are held made anew where they are asked for."""
+"""A model's columns at every sample: held in memory, or computed again where they would not fit."""
 
 from __future__ import annotations
 

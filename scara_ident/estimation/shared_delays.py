@@ -1,4 +1,4 @@
-"""By how much effort is late in each recording, as all joints tell it together, and whether that differs.
+"""How late effort is in each recording, pooled over all joints, and whether recordings differ in it.
 
 One clock stamps the effort of all joints, so that a recording is late on all of them by the same time. What a model lacks on
 one joint looks like a delay on that joint alone: other joints, whose torque changes as fast, show none. The delays that the

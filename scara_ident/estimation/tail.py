@@ -1,4 +1,4 @@
-"""How often a score exceeds a high level: the law of the peaks of its clusters.
+"""How often a score exceeds a high level: the peaks-over-threshold law of its clusters.
 
 Peaks follow a generalised Pareto law (peaks over threshold: Davison and Smith, "Models for exceedances over high thresholds",
 JRSS B 52, 1990; Coles, *An Introduction to Statistical Modeling of Extreme Values*, 2001, chapters 4 and 5). Its shape and

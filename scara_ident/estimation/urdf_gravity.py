@@ -1,4 +1,4 @@
-"""Gravity as the efforts show it, by the bodies of the URDF: whether it is there, and where it points."""
+"""Gravity as the efforts show it with the URDF's bodies: whether it is there, and its direction."""
 
 from __future__ import annotations
 

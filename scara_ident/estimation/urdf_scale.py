@@ -1,4 +1,4 @@
-"""How the torque of the identified bodies compares with that of the URDF's: a scale that no recording tells."""
+"""The torque of the identified bodies as a multiple of that of the URDF's: a scale that recordings cannot determine."""
 
 from __future__ import annotations
 

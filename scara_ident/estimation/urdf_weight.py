@@ -1,4 +1,4 @@
-"""What the weight of the identified bodies says beside their inertia: one gain scales both, a counterweight does not.
+"""The weight of the identified bodies beside their inertia: a torque gain scales both, a counterweight does not.
 
 And whether rotors are as stated; with `scale_in_words`, which says how all of that compares with the URDF.
 """

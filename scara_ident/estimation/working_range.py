@@ -1,4 +1,4 @@
-"""What data leave open of the torque that an arm can need, and what the description says of it instead.
+"""Directions of parameters that data leave open within the arm's working range, and what the description says of them instead.
 
 No joint needs more torque than its drive gives, wherever and however fast the arm moves within its limits. That is known
 before any data, and data say something of a direction of parameters only where they say more. Where a joint hardly

@@ -1,4 +1,4 @@
-"""How well a motion answers questions, in one number: in full, and at a glance.
+"""How well a motion answers open questions, as one number: exactly, and by a fast approximation.
 
 A motion is judged by what the diagnosis would see and believe of it: its columns within the bands, over the noise, block of
 time by block, beside what is known. Most of that takes time for little: a motion is smooth, so that few samples a second show

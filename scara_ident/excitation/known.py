@@ -1,4 +1,4 @@
-"""What an earlier identification or diagnosis found, to foresee torques with and to ask for."""
+"""Results of an earlier identification or diagnosis, to predict torques with and to ask for."""
 
 from __future__ import annotations
 

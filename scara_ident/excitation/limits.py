@@ -1,4 +1,4 @@
-"""What a motion must stay within, and a posture at rest that does."""
+"""Limits of a motion, and a posture at rest within them."""
 
 from __future__ import annotations
 

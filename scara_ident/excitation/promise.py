@@ -1,4 +1,4 @@
-"""What a motion would tell of questions: how sure the answers, and from which size on effects are seen."""
+"""Expected answers: how sure a motion would make the answers to questions, and from which size on effects would be found."""
 
 from __future__ import annotations
 

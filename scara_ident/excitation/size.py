@@ -1,4 +1,4 @@
-"""How large a design is: the lengths of its trajectories, their harmonics, and the samples that tell them."""
+"""The size of a design: lengths of its trajectories, their harmonics, and the samples needed."""
 
 from __future__ import annotations
 

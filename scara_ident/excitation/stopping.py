@@ -1,4 +1,4 @@
-"""When more recordings no longer pay: what std is expected after each designed motion, against what is asked."""
+"""When more recordings no longer pay: the expected standard deviation after each designed motion, against the wanted one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The motion that best tells what recordings left open.
+"""The motion that best answers what recordings left open.
 
 Effects remember, turn with the sign of a speed and pass the bands of the diagnosis, so that their columns have no useful
 derivative by a motion's coefficients. The search draws motions, takes each as large as its limits allow or smaller, and

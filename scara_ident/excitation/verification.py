@@ -1,4 +1,4 @@
-"""What a motion really reaches, between the times of the design too."""
+"""What a motion reaches of its limits, between the times of the design too."""
 
 from __future__ import annotations
 

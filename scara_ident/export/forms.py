@@ -1,4 +1,4 @@
-"""What each format can say of an identified model, and the parameters with which it says it."""
+"""What each format can represent of an identified model, and the parameters with which it does."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What an MJCF cannot say of an identified model: a Python module that installs it as passive forces."""
+"""What an MJCF cannot represent of an identified model: a Python module that installs it as passive forces."""
 
 from __future__ import annotations
 

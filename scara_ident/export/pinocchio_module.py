@@ -1,4 +1,4 @@
-"""An identified model for Pinocchio: a Python module that loads the URDF beside it and sets what a URDF cannot say."""
+"""An identified model for Pinocchio: a Python module that loads the URDF beside it and sets what a URDF cannot represent."""
 
 from __future__ import annotations
 

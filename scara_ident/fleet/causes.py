@@ -1,4 +1,4 @@
-"""What may change in an arm: directions in which the torque of its joints would, and what each is called."""
+"""Causes of change in an arm: directions in which the torque of its joints would change, and their names."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""An arm over its dates, in units of noise, and how much of what changes from date to date is no wear.
+"""An arm over its dates, in units of noise, and how much of the change from date to date is no wear.
 
 Friction, torque scale, offset and delay of a run differ from day to day on any arm. How much, all arms of a fleet say
 together: by the differences between neighbouring dates, which hardly hold anything of what changes slowly, without those that

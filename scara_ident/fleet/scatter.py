@@ -1,4 +1,4 @@
-"""What differs from date to date in a fleet where nothing changes: of runs, and of each cause beyond its noise."""
+"""Scatter from date to date in a fleet without change: of runs, and of each cause beyond its noise."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is done of a fleet, on disk under keys of what it was made from, so that a later run goes on from there."""
+"""Finished work of a fleet, on disk under keys of its inputs, so that a later run continues from there."""
 
 from __future__ import annotations
 

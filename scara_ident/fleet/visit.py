@@ -1,4 +1,4 @@
-"""What one arm shows on one date: its parameters, and triangular factors in which every change can be looked for.
+"""One arm on one date: its parameters, and triangular factors in which every change can be looked for.
 
 This is what a process of the fleet does. A recording goes in; what comes out is of the size of the model.
 """

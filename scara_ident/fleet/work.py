@@ -1,4 +1,4 @@
-"""What is to be done of a fleet, arm by arm and date by date, and what came of it."""
+"""The work of a fleet, arm by arm and date by date, and its outcome."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the functions that learn from recordings are given."""
+"""Arguments that the functions which learn from recordings share."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a residual has all along a run, or wherever the motion is the same: no event, and taken off before any is looked for."""
+"""The background of a residual: what it has all along a run, or wherever the motion is the same, is no event."""
 
 from __future__ import annotations
 

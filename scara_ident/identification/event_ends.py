@@ -1,4 +1,4 @@
-"""Where in time what stands out begins and ends, by likelihood.
+"""Begin and end of an event, by likelihood.
 
 First where the variance is larger between them than outside; then each end again, by where the mean stops being what it is
 within, or what a constant force at the tool makes of it along the motion. There a joint that turns slowly counts as far as its

@@ -1,4 +1,4 @@
-"""Where in time a residual stands out from what it is elsewhere: short, rare, and nothing that the motion repeats.
+"""Search for events: where a residual stands out in time, briefly, rarely, and not with the motion.
 
 Of the residual of a robust fit in bins what the motion makes is taken off (see `event_background`). Means over windows of 0.15
 to 2 s are compared with their own scale (the median absolute value over all recordings, and over this one), in

@@ -1,4 +1,4 @@
-"""Few samples of recordings, by which hundreds of readings of the channels are compared within a second or two."""
+"""A few samples of recordings on which hundreds of readings of the channels are compared within seconds."""
 
 from __future__ import annotations
 

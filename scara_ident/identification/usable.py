@@ -1,4 +1,4 @@
-"""Which recordings can be used: one that says nothing is left out and named, and only if none is left it is an error."""
+"""Which recordings can be used: one without information is left out and named; if none is left, that is an error."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What recordings left open, and what rows not yet recorded would say of it."""
+"""Open questions of recordings, and what further recordings would answer."""
 
 from scara_ident.inquiry.answerability import Inquiry, inquire, inquiry_of
 from scara_ident.inquiry.next_steps import NextStep, next_steps

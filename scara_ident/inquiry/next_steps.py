@@ -1,4 +1,4 @@
-"""What to do next: the questions that are open, each with the motion or the experiment that answers it."""
+"""What to do next: the open questions, each with the motion or the experiment that answers it."""
 
 from __future__ import annotations
 

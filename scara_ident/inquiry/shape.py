@@ -1,4 +1,4 @@
-"""The shape of what nothing explains: a free curve over the signals that a remainder depends on."""
+"""The shape of an unexplained residual: a free curve over the signals that it depends on."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The noise of torques that an estimate, and so a promise of what a further recording tells, stands on."""
+"""The torque noise that an estimate, and the expected answers of a further recording, rest on."""
 
 from __future__ import annotations
 

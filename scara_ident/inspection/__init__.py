@@ -1,1 +1,1 @@
-"""What is in a log."""
+"""What is in a log: columns, quantities, units and joints."""

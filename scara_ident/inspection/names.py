@@ -1,4 +1,4 @@
-"""What the name of a column says: quantity, joint, unit, and whether it was measured or commanded; else its place."""
+"""The meaning of a column's name: quantity, joint, unit, and whether it was measured or commanded; else its place."""
 
 from __future__ import annotations
 

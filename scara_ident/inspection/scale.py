@@ -1,4 +1,4 @@
-"""How much torque a recorded unit of effort is, by the masses that the URDF states."""
+"""The torque of one recorded unit of effort, by the masses that the URDF states."""
 
 from __future__ import annotations
 

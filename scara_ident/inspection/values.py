@@ -1,4 +1,4 @@
-"""What the numbers of a column say of its unit."""
+"""The unit of a column by its numbers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The base parameters of a robot: what torque can tell, and what each of them is made of.
+"""The base parameters of a robot: what torque can determine, and what each of them is a sum of.
 
 The standard parameters of an arm enter the torque only in certain sums (Gautier and Khalil 1990). The reduction
 here is numerical: columns of the regressor of random states are taken in a fixed order and kept when they are

@@ -1,4 +1,4 @@
-"""Where a model has the constant torque of each joint."""
+"""The place of each joint's constant torque in a model."""
 
 from __future__ import annotations
 

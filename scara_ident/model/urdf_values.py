@@ -1,4 +1,4 @@
-"""What the URDF says of a model's parameters."""
+"""The URDF's values of a model's parameters."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Identification beside a running controller: a sample in, parameters at any time, and a word when something changes."""
+"""Identification beside a running controller: a sample in, parameters at any time, and an alarm when something changes."""
 
 from scara_ident.online.detector import Alarm
 from scara_ident.online.identifier import OnlineIdentifier

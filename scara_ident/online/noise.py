@@ -1,4 +1,4 @@
-"""How large the noise is, as it shows itself: of torques in what the parameters leave of them, of positions about a low-pass."""
+"""Estimates of the noise: of torques by the residual, of positions about a low-pass."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How an online identification works: what it filters, forgets, and calls a change."""
+"""Settings of an online identification: its filter, its forgetting, and its alarm."""
 
 from __future__ import annotations
 

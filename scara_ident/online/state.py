@@ -1,4 +1,4 @@
-"""What an online identification remembers: the triangular factor of all rows, with what is old forgotten."""
+"""The state of an online identification: the triangular factor of all rows, with old rows forgotten."""
 
 from __future__ import annotations
 

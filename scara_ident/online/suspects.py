@@ -1,4 +1,4 @@
-"""What the detector looks for: torques that a payload, other friction or another torque scale would bring."""
+"""Suspects of the detector: torques that a payload, other friction or another torque scale would bring."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the reduction to base parameters tells."""
+"""The reduction to base parameters as text."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a comparison tells: the JSON and the sentences."""
+"""A comparison as JSON and as sentences."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a diagnosis tells: the contract's JSON."""
+"""A diagnosis as JSON, with the contract's keys."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The story of a diagnosis in Markdown."""
+"""A diagnosis in Markdown."""
 
 from __future__ import annotations
 

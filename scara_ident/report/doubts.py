@@ -1,4 +1,4 @@
-"""What makes all parameters mean something else than their names say: it is said before them, wherever they are reported."""
+"""Doubts that concern all parameters, such as efforts of opposite sign: they stand first wherever parameters are reported."""
 
 from __future__ import annotations
 

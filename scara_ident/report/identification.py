@@ -1,4 +1,4 @@
-"""What an identification tells: the contract's JSON, and sentences for a person."""
+"""An identification as JSON, with the contract's keys, and as sentences."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Torque of a recording, recorded, predicted and left over, sample by sample: all that a report draws over time.
+"""Recorded and predicted torque and residual, sample by sample: all that a report draws over time.
 
 Motion and columns are those of the observations; nothing else in the report computes a torque or a residual.
 """

@@ -1,4 +1,4 @@
-"""What is reported of a model in use: ``use.json`` and the sentences."""
+"""A model in use as JSON, ``use.json``, and as sentences."""
 
 from __future__ import annotations
 

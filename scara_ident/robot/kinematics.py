@@ -1,4 +1,4 @@
-"""How the joints of a robot hang together: which carries which, about which axis, and where the tool is."""
+"""The kinematic structure of a robot: parents and axes of its joints, and the tool."""
 
 from __future__ import annotations
 

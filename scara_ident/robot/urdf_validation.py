@@ -1,4 +1,4 @@
-"""Why a URDF cannot be used, which its parser does not say or does not see."""
+"""Why a URDF cannot be used, where its parser does not say so."""
 
 from __future__ import annotations
 

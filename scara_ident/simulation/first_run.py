@@ -1,4 +1,4 @@
-"""The first run on a machine: the loop becomes machine code, which is kept, and whoever waits is informed."""
+"""The first run on a machine: the loop is compiled, cached, and the user informed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The torque that a motion takes, without effects, and what the controller starts from."""
+"""The torque of a motion without effects, and the controller's initial state."""
 
 from __future__ import annotations
 

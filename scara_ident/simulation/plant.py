@@ -1,4 +1,4 @@
-"""What the compiled loop integrates: the arm and its effects as plain arrays on the joint side of the gears.
+"""The plant that the compiled loop integrates: the arm and its effects as plain arrays on the joint side of the gears.
 
 Rows are in Pinocchio's order of joints. Recorded-side constants are brought to the joint side with
 ``torque at the joint = scale x recorded torque``, where scale is N on the motor side and 1 on the joint side.

@@ -1,4 +1,4 @@
-"""What differs from run to run on one arm, and how the recorded torque scatters."""
+"""Differences from run to run on one arm, and the noise of the recorded torque."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What an arm really does under its controller, sample by sample, and how finely that has to be integrated."""
+"""The true motion of an arm under its controller, sample by sample, and the step of its integration."""
 
 from __future__ import annotations
 

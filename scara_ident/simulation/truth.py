@@ -1,4 +1,4 @@
-"""What a simulated arm really was, as JSON beside its recording."""
+"""The truth of a simulated arm, as JSON beside its recording."""
 
 from __future__ import annotations
 

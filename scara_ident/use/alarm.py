@@ -1,4 +1,4 @@
-"""When an external torque is no longer what the model's errors make: thresholds with a stated rate of false alarms.
+"""Alarm thresholds of an external torque at a stated rate of false alarms.
 
 The size of the residual is explained by features of the motion, joint by joint; in units of that the largest over the joints is
 watched. The alarm is at the level that its peaks exceed as often as is stated (`tail`).

@@ -1,4 +1,4 @@
-"""Whether a motion can be run, by the torque that an identified model foresees for it."""
+"""Whether a motion can be run, by the torque that an identified model predicts for it."""
 
 from __future__ import annotations
 

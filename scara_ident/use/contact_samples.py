@@ -1,4 +1,4 @@
-"""What of a contact its force is fitted to: samples at which the force is whole, beside what the observer shows of one there."""
+"""Samples of a contact that its force is fitted to: those at which the observer shows all of it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Limits of the joints and their drives, and what a motion reaches of them."""
+"""Limits of the joints and their drives, and how near a motion comes to them."""
 
 from __future__ import annotations
 

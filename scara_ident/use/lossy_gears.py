@@ -1,4 +1,4 @@
-"""What gears that lose a share of what they transmit pass on of their drives' torque, sample by sample."""
+"""Transmission losses of an external torque: what gears pass on to their drives, sample by sample."""
 
 from __future__ import annotations
 

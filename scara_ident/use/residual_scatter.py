@@ -1,4 +1,4 @@
-"""How much the external torque without contact scatters, by what the joints do: the uncertainty of a force estimated from it."""
+"""The scatter of the external torque without contact, by what the joints do: the uncertainty of a force estimated from it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a model wins: fed forward, and in simulation, before and after the effects that were found."""
+"""The benefit of a model: fed forward, and in simulation, before and after the effects that were found."""
 
 from __future__ import annotations
 

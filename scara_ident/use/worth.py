@@ -1,4 +1,4 @@
-"""What each effect that was found costs in tracking, and what feeding it forward wins."""
+"""The cost of each effect in tracking, and the benefit of feeding it forward."""
 
 from __future__ import annotations
 

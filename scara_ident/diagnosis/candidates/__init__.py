@@ -1,1 +1,1 @@
-"""What may be missing: the members of each effect, spectral lines, their columns, and what none of them can be."""
+"""Candidates: members of each effect, spectral lines, their columns, and what their nonlinear parameters may be."""

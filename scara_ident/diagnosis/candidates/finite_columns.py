@@ -1,4 +1,4 @@
-"""Columns that are finite: where the arithmetic of an effect divides by zero or overflows, nothing follows of the arm."""
+"""Columns that are finite: rows of an effect that divides by zero or overflows say nothing about the arm."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Candidates that cannot be tried: the arithmetic of their effect makes columns of these recordings that are not finite."""
+"""Candidates that cannot be tested because their columns are not finite on these recordings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The nonlinear parameters of effects in a model: what they are, where they may go, and what is known of them before.
+"""The nonlinear parameters of the effects in a model: which there are, their limits, and their priors.
 
 Armatures are among them: where the base model cannot tell a rotor from its link, the load that a gear transmits follows
 from the nominal rotor inertia only, which a data sheet gives without shaft, brake and wave generator, and which is

@@ -1,1 +1,1 @@
-"""What may have made a candidate instead: noise, runs that differ, filters, setpoints, another minimum or law."""
+"""What else may have produced a candidate: noise, runs that differ, filters, setpoints, another minimum or law."""

@@ -1,4 +1,4 @@
-"""How sure an instant is at which a torque jumps: by what it would be without each of the recordings.
+"""Standard deviation of an instant at which a torque jumps: the jackknife over recordings.
 
 The slope of the columns tells a standard deviation where noise is the same at all times. Where runs differ, what one run's friction
 does about another instant makes the fit as good there, and no slope at the instant found shows that.

@@ -1,4 +1,4 @@
-"""Whether the noise of positions, or what they swing by, makes an effect rather than the arm."""
+"""Whether position noise, or ringing of the positions, produces an effect rather than the arm."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the parameters of an effect owe to the fit that they are of: another law or minimum may explain as much with others.
+"""How far the parameters of an effect depend on the fit: another law or another minimum may explain as much with other values.
 
 What is left of a correction of the data may explain more.
 """

@@ -1,4 +1,4 @@
-"""Fits of effects that act together, begun again elsewhere: one takes up what another does, and a fit may end in any minimum.
+"""Other minima of effects that act together: fits started elsewhere, because one effect may absorb another.
 
 What such effects' parameters owe to the minimum, to the band, and to others of their kind that were not found, their standard
 deviations are to hold: the noise of positions, which grows with frequency, may make a minimum of its own in a wide band, and what is

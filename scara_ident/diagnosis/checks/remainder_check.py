@@ -1,4 +1,4 @@
-"""Whether what may be left of a correction of the data makes an effect rather than the arm."""
+"""Whether what a correction leaves in the data produces an effect rather than the arm."""
 
 from __future__ import annotations
 

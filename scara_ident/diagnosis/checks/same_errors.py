@@ -1,4 +1,4 @@
-"""Whether two models leave as much, but for what chance or the noise of the positions makes."""
+"""Whether the residuals of two models differ by no more than chance or position noise."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether recorded positions are what the arm was commanded instead of what it did, and what is to be believed of effects then.
+"""Whether recorded positions are setpoints instead of measurements, and which effects can be believed then.
 
 An arm lags behind its setpoints by what its controller needs to build up the torque, which turns round with friction over some way of
 them: nothing in the recordings tells that from friction or a gear that yields.

@@ -1,4 +1,4 @@
-"""Whether runs that differ from one another, rather than an effect of the arm, make an effect."""
+"""Whether differences between runs, rather than an effect of the arm, produce an effect."""
 
 from __future__ import annotations
 

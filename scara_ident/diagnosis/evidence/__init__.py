@@ -1,1 +1,1 @@
-"""Whether what is left is noise, and what a search leaves if it is not."""
+"""Whether the residual is noise, and what a search leaves if it is not."""

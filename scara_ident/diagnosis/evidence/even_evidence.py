@@ -1,4 +1,4 @@
-"""Whether one recording leaves more than all others do, though each of them looks like noise."""
+"""Whether one recording leaves a larger residual than all others, though each residual looks like noise."""
 
 from __future__ import annotations
 

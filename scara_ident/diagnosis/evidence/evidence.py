@@ -1,4 +1,4 @@
-"""Whether what is left on each joint was shown to be noise, and whether something else would have been seen.
+"""Whether the residual of each joint was shown to be noise, and whether anything else would have been detected.
 
 That nothing was found says little where nothing could have been found. A joint's residual is shown to be noise where
 repetitions bound what repeats of it, or where it is white within the band, so that no motion of the arm, whose power is

@@ -1,4 +1,4 @@
-"""Whether torque comes late in all runs alike: a delay that nothing stands for counts as what runs differ by, and is none."""
+"""Whether torque is late in all runs alike: a delay that the model lacks counts as variation between runs, and is none."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a search leaves: whether it is noise, and on which joint something is left over."""
+"""What a search leaves: whether it is noise, and on which joint the model still lacks something."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Lines that stay in the residual's spectrum: what is periodic in time is no noise, whatever its phase in each recording.
+"""Standing lines in the residual's spectrum: what is periodic in time is no noise, whatever its phase in each recording.
 
 A torque that runs on its own, as a fan's or a floor's, has another phase in every recording: it repeats in none, and what
 repeats of a residual says nothing of it. One above the band is in no fit at all.

@@ -1,4 +1,4 @@
-"""Whether the arm stayed the same within its recordings: what changes another way in each repeats in none, and is no noise."""
+"""Whether the arm stayed the same within its recordings: changes that differ between recordings repeat in none, and are no noise."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Nonlinear parameters with all others, and what is taken out of the data."""
+"""Nonlinear parameters fitted together with all others, and corrections of the data."""

@@ -1,4 +1,4 @@
-"""The scene at an estimate of a model with effects: what the base model says, and what effects do to the links."""
+"""The scene at the estimate of a model with effects: the base model's torque, and what effects do to the links."""
 
 from __future__ import annotations
 

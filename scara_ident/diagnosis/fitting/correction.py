@@ -1,4 +1,4 @@
-"""Effects that are taken out of the recordings, such as a delay, before anything else is said of them."""
+"""Effects that correct the recordings, such as a delay, before others are tested."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Intervals in which an effect of a model acts, fitted to the rows that all else is fitted to.
+"""Intervals in which an effect acts, fitted to the same rows as all else.
 
 A member's intervals are proposed by means over short cells of time; how they are to be moved follows from the rows within the bands,
 those about a rest among them, of a model that has the effect.

@@ -1,4 +1,4 @@
-"""A model with effects, linear in all its parameters about the present nonlinear ones.
+"""A model with effects, linearised in its nonlinear parameters.
 
 Columns of an effect may follow from the bodies as strongly as from its own parameters, as an elastic joint's do. Such an
 effect is tied: it says what its coefficient is and what its torque changes by, and the columns of the bodies take that up.

@@ -1,4 +1,4 @@
-"""Fitting the nonlinear parameters of all effects in a model together, by steps that are as long as their linear model has held.
+"""Joint fit of the nonlinear parameters of all effects in a model, by trust-region steps.
 
 The method is that of Levenberg (Quarterly of Applied Mathematics 2, 1944) and Marquardt (J. SIAM 11, 1963) with the radius of Moré
 (Lecture Notes in Mathematics 630, 1978); what linear parameters take up is no part of a step's length (Golub and Pereyra, SIAM J.

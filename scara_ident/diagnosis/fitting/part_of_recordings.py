@@ -1,4 +1,4 @@
-"""A selection step on as many of the recordings as tell its effects: looking for other minima needs no more."""
+"""A selection step on a part of the recordings that determines its effects: enough for finding other minima."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Least squares with limits on how far each parameter and all of them together may go: no linear model holds far from its place.
+"""Trust-region least squares with limits on each parameter: the linearisation holds only near its point.
 
 The multiplier that keeps a step within a radius is that of Moré (Lecture Notes in Mathematics 630, 1978): what the column of a parameter
 makes, and not its unit, says how far it goes.

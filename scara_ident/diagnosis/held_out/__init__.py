@@ -1,1 +1,1 @@
-"""What was found, on recordings that had no part in finding it."""
+"""What was found, judged on recordings that had no part in finding it."""

@@ -1,4 +1,4 @@
-"""What is to be taken out of a held-out recording where each recording has its own: estimated on its first part."""
+"""The correction of a held-out recording where each recording has its own: estimated on its first part."""
 
 from __future__ import annotations
 

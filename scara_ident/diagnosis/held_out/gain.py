@@ -1,4 +1,4 @@
-"""What each effect found removes on recordings that no choice has seen."""
+"""The held-out gain of each effect: what it removes on recordings that no choice has seen."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""In which intervals of a held-out recording an effect acts that acts in some: for each joint by the torque of the others.
+"""Intervals of a held-out recording in which an effect acts: for each joint by the torque of the others.
 
 No torque takes part in the choice of where it is itself predicted with the effect, so that errors stay those of recordings that
 no choice has seen; of an effect that loads one joint alone nothing is predicted there.

@@ -1,4 +1,4 @@
-"""Which of the effects that act in some recordings act in a held-out one: estimated on its first part, judged on the rest.
+"""Which effects act in a held-out recording, of those that act in some only: estimated on its first part, judged on the rest.
 
 Where effects act in intervals of recordings, see `held_out_intervals`.
 """

@@ -1,4 +1,4 @@
-"""What recordings that no choice has seen say of the model that the others led to."""
+"""Validation: the model on recordings that no choice has seen."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Forward and back from one model to the next, what stays open of that, and what cannot be told apart."""
+"""Stepwise selection, forward and backward, what it leaves open, and what cannot be told apart."""

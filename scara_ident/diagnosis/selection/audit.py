@@ -1,4 +1,4 @@
-"""A last look at the effects found, each beside all others: those that do not stand it are not believed."""
+"""The audit of a selection: each effect is tested again beside all others, and removed if it fails."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which candidate comes in next: the best families refined, and none that noise or runs make."""
+"""Which candidate enters next: the best families refined, and none that noise or differences between runs produce."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Exchanging an effect for one that explains more in its place: what came in early was fitted without what came later."""
+"""Exchange of an effect for one that explains more in its place: what entered early was fitted without what entered later."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Events that may be what an effect makes which acts in intervals of recordings: these are not left out before it was tried."""
+"""Events that an effect acting in intervals may explain: not left out before that was tested."""
 
 from __future__ import annotations
 

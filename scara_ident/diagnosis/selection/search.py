@@ -1,4 +1,4 @@
-"""The search: one effect after another, the one that helps most on data that it was not fitted to."""
+"""Stepwise search: one effect after another, each time the one that helps most on folds that it was not fitted to."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where a search stands: the model so far, and what may still come in."""
+"""The state of a search: the model so far, and the candidates that may still enter."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Effects worth a look that are not believed, and what would settle them."""
+"""Tentative effects: worth a look, not believed, with the experiment that would decide."""
 
 from __future__ import annotations
 

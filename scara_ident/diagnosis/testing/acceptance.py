@@ -1,4 +1,4 @@
-"""Letting an effect in: every condition that it must meet, and the words for the one that it fails."""
+"""Acceptance of an effect: every condition that it must meet, and in words the one that it fails."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Weights of blocks that leave a test freedom where one block holds most of what tells a candidate.
+"""Block weights that keep a test's degrees of freedom where one block holds most of the information on a candidate.
 
 A coefficient that one block tells has about one degree of freedom, and takes thousands of standard errors to be
 significant, however clearly all other blocks tell it as well. With weights the block counts for less: a coefficient that

@@ -1,4 +1,4 @@
-"""What the rows say for and against each candidate: tests that respect correlation, gain on what was not fitted."""
+"""Tests of each candidate: significance under correlated residuals, and gain on folds that it was not fitted to."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tests of coefficients that stay honest with few blocks and with correlated residuals.
+"""Cluster-robust tests of coefficients that hold with few blocks and correlated residuals.
 
 Each block of time is a cluster. What the coefficients would be without a block follows in closed form from small
 products (delete-one jackknife, in which all parameters of the model are fitted again), and the scatter of these gives

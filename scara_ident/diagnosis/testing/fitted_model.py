@@ -1,4 +1,4 @@
-"""A model fitted to rows, and the products of columns tried beside it, block of time by block of time.
+"""A model fitted to rows, and the products of candidate columns beside it, block of time by block of time.
 
 The model's columns are made orthonormal by the triangular factor of all rows, Z; a candidate's columns C leave
 ``X = C - Z S`` with ``S = Z' C``, and the torque leaves ``e``. Every statistic follows from the small products ``X' X`` and

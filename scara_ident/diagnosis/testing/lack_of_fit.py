@@ -1,4 +1,4 @@
-"""Is anything missing? The part of the residual that repeats, against the part that does not."""
+"""Lack of fit: the part of the residual that repeats, against the part that does not."""
 
 from __future__ import annotations
 

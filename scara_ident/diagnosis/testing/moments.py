@@ -1,4 +1,4 @@
-"""Repetitions of a motion counted once: where what a model lacks repeats, so does what it makes of an effect.
+"""Repetitions of a motion counted once: what a model lacks repeats with the motion, and so does its effect on a candidate.
 
 Noise is another in every repetition, and five of them tell five times as much. What is missing is the same in all, so that
 five blocks of one moment of a motion are one (Moulton 1990, "An illustration of a pitfall in estimating the effects of

@@ -1,4 +1,4 @@
-"""A second test for what removes nearly all of the residual: by rows, with the memory that the rest of it has.
+"""A second test, by rows with autocorrelated errors, for candidates that remove nearly all of the residual.
 
 Blocks of time are few, and a column that lives in some of them leaves `cluster_test` hardly any freedom: a cubic term of
 the torque that removes nine tenths of the residual may then pass for chance. What is left beside such a candidate is

@@ -1,4 +1,4 @@
-"""What a remainder depends on: shrunken means over bins of signals, judged on trajectories that they were not taken from."""
+"""Which signals a residual depends on: shrunken means over bins, judged on trajectories that they were not taken from."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a real arm allows of a term's parameters, declared by the term and collected by the estimators.
+"""Physical constraints on a term's parameters, declared by the term and collected by the estimators.
 
 Only facts are declared here; how a solver writes them is the estimators' matter.
 """

@@ -1,4 +1,4 @@
-"""The effects found, each with the residuals before and after it came in."""
+"""The effects found, each with the residuals before and after it entered."""
 
 from __future__ import annotations
 

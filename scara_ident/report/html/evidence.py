@@ -1,4 +1,4 @@
-"""What a result rests on, section by section: errors before and after, what was tried, what is not sure, events, how runs differ."""
+"""The evidence behind a result, section by section: errors before and after, what was tried, what is uncertain, events, how runs differ."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What no effect accounts for, over the signals that it depends on."""
+"""The unexplained residual over the signals that it depends on."""
 
 from __future__ import annotations
 

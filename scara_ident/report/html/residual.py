@@ -1,4 +1,4 @@
-"""What is left: the residual against each signal, its spectra and its memory."""
+"""The residual against each signal, its spectra and its autocorrelation."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The figures that show one effect: the residual before and after it came in."""
+"""The figures that show one effect: the residual before and after it entered."""
 
 from __future__ import annotations
 

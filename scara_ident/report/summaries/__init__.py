@@ -1,1 +1,1 @@
-"""What a result tells in Python, a module for each kind: `summary`, `columns` of a data frame, and `figure`."""
+"""Results in Python: `summary`, `columns` of a data frame, and `figure`, a module for each kind."""

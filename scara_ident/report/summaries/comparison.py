@@ -1,4 +1,4 @@
-"""What a comparison tells: every trajectory's parameters on every trajectory."""
+"""Summary, columns and figure of a comparison: every trajectory's parameters on every trajectory."""
 
 from __future__ import annotations
 

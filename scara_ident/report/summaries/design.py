@@ -1,4 +1,4 @@
-"""What a design tells: its criteria and limits, and the motion."""
+"""Summary, columns and figure of a design: its criteria and limits, and the motion."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a diagnosis tells: the verdict, the effects found, errors before and after, and what else was tried."""
+"""Summary, columns and figure of a diagnosis: the verdict, the effects found, errors before and after, and what else was tried."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What an estimate tells: its parameters."""
+"""Summary, columns and figure of an estimate: its parameters."""
 
 from __future__ import annotations
 

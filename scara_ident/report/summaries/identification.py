@@ -1,4 +1,4 @@
-"""What an identification tells: parameters, errors on every recording, and sentences."""
+"""Summary, columns and figure of an identification: parameters, errors on every recording, and sentences."""
 
 from __future__ import annotations
 

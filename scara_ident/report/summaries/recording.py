@@ -1,4 +1,4 @@
-"""What a recording tells: how long and how fast it is, what its audit found, and its signals."""
+"""Summary, columns and figure of a recording: how long and how fast it is, its audit, and its signals."""
 
 from __future__ import annotations
 

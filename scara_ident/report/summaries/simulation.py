@@ -1,4 +1,4 @@
-"""What a simulation tells: its recording, and what was behind it."""
+"""Summary, columns and figure of a simulation: its recording, and the truth behind it."""
 
 from __future__ import annotations
 
