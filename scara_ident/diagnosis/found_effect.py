@@ -157,7 +157,7 @@ def found_effects(
                 candidate.effect.name,
                 candidate.joint(scene),
                 candidate.effect.description(scene, candidate.member) + otherwise,
-                candidate.effect.with_even_powers(values),
+                candidate.effect.with_symmetric_powers(values),
                 confounded,
                 min(1.0, decision.examination.p_value * found.tried),
                 decision.gain,

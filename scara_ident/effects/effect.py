@@ -249,7 +249,7 @@ class Effect(ABC):
             for k, column in enumerate(self.columns(scene, member))
         }
 
-    def with_even_powers(self, parameters: Mapping[str, Parameter]) -> Mapping[str, Parameter]:
+    def with_symmetric_powers(self, parameters: Mapping[str, Parameter]) -> Mapping[str, Parameter]:
         """Return physical parameters, nonlinear ones too, with the power of each that the data tell, where others decide that."""
         return parameters
 

@@ -90,7 +90,7 @@ class JointElasticity(BehindGear):
         ),
     )  # fmt: skip
     nonlinear = (
-        NonlinearParameter("frequency", "Hz", LOWEST_FREQUENCY, HIGHEST_FREQUENCY, even_power=-2.0),
+        NonlinearParameter("frequency", "Hz", LOWEST_FREQUENCY, HIGHEST_FREQUENCY, symmetric_power=-2.0),
         NonlinearParameter("_damping_ratio", "1", LOWEST_DAMPING, HIGHEST_DAMPING),
     )
     fitted_first = True
@@ -203,7 +203,7 @@ class JointElasticity(BehindGear):
             return {"stiffness": Parameter(np.inf, np.inf, unit)}
         return {"stiffness": Parameter(1.0 / compliance, deviation(covariance) / compliance**2, unit)}
 
-    def with_even_powers(self, parameters: Mapping[str, Parameter]) -> Mapping[str, Parameter]:
+    def with_symmetric_powers(self, parameters: Mapping[str, Parameter]) -> Mapping[str, Parameter]:
         """Say of the stiffness how much of what is unsure of it is the frequency, and not the inertia that goes with this.
 
         The stiffness follows the inertia, and its reciprocal the even power of the frequency.
@@ -212,7 +212,7 @@ class JointElasticity(BehindGear):
         if not 0.0 < stiffness.std < np.inf:
             return parameters
         share = min(1.0, (2.0 * frequency.std / frequency.value * stiffness.value / stiffness.std) ** 2)
-        return {**parameters, "stiffness": replace(stiffness, even_power=1.0 - 2.0 * share)}
+        return {**parameters, "stiffness": replace(stiffness, symmetric_power=1.0 - 2.0 * share)}
 
     def read_directly(
         self, scene: Scene, joint: int, recordings: Sequence[PreparedRecording], rotor_std: float

@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.effects.even_power import interval
+from scara_ident.effects.symmetric_power import interval
 
 
 @dataclass(frozen=True)
@@ -17,19 +17,19 @@ class Parameter:
 
     Attributes
     ----------
-    even_power : float
-        The power of it that the data tell: 1 itself, -1 its reciprocal, 0 its logarithm; see `scara_ident.effects.even_power`.
+    symmetric_power : float
+        The power of it that the data tell: 1 itself, -1 its reciprocal, 0 its logarithm; see `scara_ident.effects.symmetric_power`.
     """
 
     value: float
     std: float
     unit: str
-    even_power: float = 1.0
+    symmetric_power: float = 1.0
 
     @property
     def interval(self) -> tuple[float, float] | None:
         """Where it is with 95 %, an open end infinite; None where that is the value give or take two standard deviations."""
-        return interval(self.value, self.std, self.even_power)
+        return interval(self.value, self.std, self.symmetric_power)
 
     def entry(self) -> dict[str, Any]:
         """Return it as JSON has it, an open end None."""
@@ -54,7 +54,7 @@ class NonlinearParameter:
         Whether it is scanned and refined on a logarithmic scale.
     of_length : bool
         Whether it is a way of the joint: of one that slides ``lower`` and ``upper`` are multiples of `Scene.radian`.
-    even_power : float or None
+    symmetric_power : float or None
         The power of it that the data tell, see `Parameter`; None for what it is refined in, its logarithm or itself.
     jumps : bool
         Whether it is an instant, s, at which the columns jump.
@@ -66,13 +66,13 @@ class NonlinearParameter:
     upper: float
     logarithmic: bool = True
     of_length: bool = False
-    even_power: float | None = None
+    symmetric_power: float | None = None
     jumps: bool = False
 
     def parameter(self, value: float, std: float, unit: str) -> Parameter:
         """Return it as a physical parameter."""
-        even_power = (0.0 if self.logarithmic else 1.0) if self.even_power is None else self.even_power
-        return Parameter(value, std, unit, even_power)
+        symmetric_power = (0.0 if self.logarithmic else 1.0) if self.symmetric_power is None else self.symmetric_power
+        return Parameter(value, std, unit, symmetric_power)
 
 
 @dataclass(frozen=True)

@@ -45,7 +45,9 @@ class Presliding(Effect):
         ),
     )  # fmt: skip
     # Fits scatter evenly about it, and not about its logarithm.
-    nonlinear = (NonlinearParameter("presliding_distance", "{position}", 1e-5, 0.3, of_length=True, even_power=1.0),)
+    nonlinear = (
+        NonlinearParameter("presliding_distance", "{position}", 1e-5, 0.3, of_length=True, symmetric_power=1.0),
+    )
     in_small_ways = True
     view = View("reversal", along=True, distance="presliding_distance")
     experiment = "reverse often with small amplitude at two speeds: its memory is in the way gone, a delay's is in time"

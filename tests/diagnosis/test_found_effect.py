@@ -53,14 +53,14 @@ def test_errors_go_from_effect_to_effect() -> None:
 class Reciprocal(Spring):
     """A spring of which the compliance is told."""
 
-    def with_even_powers(self, parameters: Mapping[str, Parameter]) -> Mapping[str, Parameter]:
-        return {name: replace(item, even_power=-1.0) for name, item in parameters.items()}
+    def with_symmetric_powers(self, parameters: Mapping[str, Parameter]) -> Mapping[str, Parameter]:
+        return {name: replace(item, symmetric_power=-1.0) for name, item in parameters.items()}
 
 
 @pytest.mark.slow
 def test_an_effect_says_as_what_its_parameters_are_told() -> None:
     (found,) = diagnose(load_robot(), virtual_runs("spring:joint1"), bands=BANDS, catalogue=(Reciprocal(),)).effects
-    assert found.parameters["stiffness"].even_power == -1.0
+    assert found.parameters["stiffness"].symmetric_power == -1.0
 
 
 def test_what_a_second_encoder_tells_of_an_effect_that_was_not_added_is_said() -> None:

@@ -57,8 +57,8 @@ def test_a_stiffness_is_told_as_what_is_unsure_of_it_is(of_inertia: float, of_fr
     """k = I (2 pi f)^2: even about itself with the inertia, and as its reciprocal with a frequency that nothing shows."""
     std = 5000.0 * np.hypot(of_inertia, 2.0 * of_frequency if np.isfinite(of_frequency) else 0.0)
     own = {"stiffness": Parameter(5000.0, std, "N m/rad"), "frequency": Parameter(20.0, 20.0 * of_frequency, "Hz")}
-    told = JointElasticity().with_even_powers(own)
-    assert told["stiffness"].even_power == pytest.approx(power)
+    told = JointElasticity().with_symmetric_powers(own)
+    assert told["stiffness"].symmetric_power == pytest.approx(power)
     assert (told["stiffness"].value, told["stiffness"].std, told["frequency"]) == (5000.0, std, own["frequency"])
     assert (told["stiffness"].interval is None) == (power == 1.0)
 
@@ -69,7 +69,7 @@ def test_a_stiffness_with_an_open_end_is_not_called_settled(share: float):
     family, opened = JointElasticity(), []
     for part in np.linspace(0.05, 2.0, 79):
         frequency = Parameter(20.0, 20.0 * 0.5 * np.sqrt(share) * part, "Hz")
-        told = family.with_even_powers(
+        told = family.with_symmetric_powers(
             {"stiffness": Parameter(5000.0, 5000.0 * part, "N m/rad"), "frequency": frequency}
         )
         ends = told["stiffness"].interval
@@ -80,7 +80,7 @@ def test_a_stiffness_with_an_open_end_is_not_called_settled(share: float):
 
 def test_a_stiffness_that_nothing_tells_stays_so():
     own = {"stiffness": Parameter(np.inf, np.inf, "N m/rad"), "frequency": Parameter(20.0, 3.0, "Hz")}
-    assert JointElasticity().with_even_powers(own) == own
+    assert JointElasticity().with_symmetric_powers(own) == own
 
 
 def test_the_width_is_recovered():

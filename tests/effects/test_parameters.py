@@ -23,26 +23,26 @@ def test_a_variance_below_zero_by_rounding_is_none():
 
 
 def test_an_interval_is_told_where_value_and_deviation_say_too_little():
-    stiffness = Parameter(3845.0, 1504.0, "N m/rad", even_power=-1.0)
+    stiffness = Parameter(3845.0, 1504.0, "N m/rad", symmetric_power=-1.0)
     low, high = stiffness.interval
     assert stiffness.entry() == {"value": 3845.0, "std": 1504.0, "unit": "N m/rad", "interval": [low, high]}
     assert (low, high) == (pytest.approx(2157.0, rel=1e-3), pytest.approx(17663.0, rel=1e-3))
-    unsettled = Parameter(3845.0, 2000.0, "N m/rad", even_power=-1.0)
+    unsettled = Parameter(3845.0, 2000.0, "N m/rad", symmetric_power=-1.0)
     assert unsettled.entry()["interval"] == [pytest.approx(1885.0, rel=1e-3), None]
-    for plain in (Parameter(3845.0, 1504.0, "N m/rad"), Parameter(3845.0, 50.0, "N m/rad", even_power=-1.0)):
+    for plain in (Parameter(3845.0, 1504.0, "N m/rad"), Parameter(3845.0, 50.0, "N m/rad", symmetric_power=-1.0)):
         assert plain.interval is None
         assert set(plain.entry()) == {"value", "std", "unit"}
 
 
 @pytest.mark.parametrize(
-    ("item", "even_power"),
+    ("item", "symmetric_power"),
     [
         (NonlinearParameter("distance", "rad", 1e-5, 0.3), 0.0),
         (NonlinearParameter("place", "rad", -1.0, 4.0, logarithmic=False), 1.0),
-        (NonlinearParameter("frequency", "Hz", 0.05, 200.0, even_power=-2.0), -2.0),
+        (NonlinearParameter("frequency", "Hz", 0.05, 200.0, symmetric_power=-2.0), -2.0),
     ],
 )
 def test_a_nonlinear_parameter_is_told_as_it_is_refined_unless_it_says_otherwise(
-    item: NonlinearParameter, even_power: float
+    item: NonlinearParameter, symmetric_power: float
 ):
-    assert item.parameter(0.2, 0.1, "rad") == Parameter(0.2, 0.1, "rad", even_power)
+    assert item.parameter(0.2, 0.1, "rad") == Parameter(0.2, 0.1, "rad", symmetric_power)

@@ -102,7 +102,7 @@ def test_a_remainder_is_told_with_joint_signal_and_size():
 
 def test_a_skewed_parameter_has_its_interval_an_open_end_null(result):
     (effect,) = result.effects
-    skewed = {"stiffness": Parameter(3845.0, 2000.0, "N m/rad", even_power=-1.0)}
+    skewed = {"stiffness": Parameter(3845.0, 2000.0, "N m/rad", symmetric_power=-1.0)}
     found = replace(result, effects=(replace(effect, parameters=skewed),))
     entry = json.loads(json.dumps(plain(diagnosis_dict(found)), allow_nan=False))["effects"][0]["parameters"][
         "stiffness"

@@ -58,7 +58,7 @@ def test_where_the_effects_make_it_worse_it_is_said(result):
 
 
 @pytest.mark.parametrize(
-    ("std", "even_power", "said"),
+    ("std", "symmetric_power", "said"),
     [
         (150.0, -1.0, "stiffness 3.84e+03 ± 2e+02 N m/rad"),
         (1504.0, 1.0, "stiffness 3.84e+03 ± 2e+03 N m/rad"),
@@ -69,8 +69,8 @@ def test_where_the_effects_make_it_worse_it_is_said(result):
         (np.inf, -1.0, "stiffness about 3.84e+03 N m/rad (not determined by recordings)"),
     ],
 )
-def test_an_interval_is_said_where_a_standard_deviation_says_too_little(std: float, even_power: float, said: str):
-    assert quantity("stiffness", Parameter(3845.0, std, "N m/rad", even_power)) == said
+def test_an_interval_is_said_where_a_standard_deviation_says_too_little(std: float, symmetric_power: float, said: str):
+    assert quantity("stiffness", Parameter(3845.0, std, "N m/rad", symmetric_power)) == said
 
 
 def test_what_says_the_law_has_no_uncertainty():

@@ -116,7 +116,7 @@ def test_the_deviation_of_a_nonlinear_parameter_is_its_scatter_over_noise():
     assert told["amplitude"].std == pytest.approx(np.std(amplitude), rel=0.4)
     assert abs(told["amplitude"].value - AMPLITUDE) < 4.0 * told["amplitude"].std
     assert told["velocity"].unit == "rad/s"
-    assert (told["velocity"].even_power, told["amplitude"].even_power) == (0.0, 1.0)
+    assert (told["velocity"].symmetric_power, told["amplitude"].symmetric_power) == (0.0, 1.0)
 
 
 def test_several_effects_get_their_own_parameters():

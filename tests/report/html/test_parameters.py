@@ -45,7 +45,7 @@ def test_what_cancels_in_the_urdf_is_0_and_no_rounding(result, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("std", "even_power", "shown"),
+    ("std", "symmetric_power", "shown"),
     [
         (150.0, -1.0, "1.5e+02"),
         (1504.0, -1.0, "2160 to 17700 (95 %)"),
@@ -55,6 +55,6 @@ def test_what_cancels_in_the_urdf_is_0_and_no_rounding(result, monkeypatch):
     ],
 )
 def test_the_table_has_the_interval_where_a_standard_deviation_says_too_little(
-    std: float, even_power: float, shown: str
+    std: float, symmetric_power: float, shown: str
 ):
-    assert unsure(Parameter(3845.0, std, "N m/rad", even_power)) == shown
+    assert unsure(Parameter(3845.0, std, "N m/rad", symmetric_power)) == shown

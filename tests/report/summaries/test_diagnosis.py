@@ -27,7 +27,7 @@ def test_a_diagnosis_tells_the_effect_and_its_parameters(results: Results):
 
 def test_the_frame_has_the_ends_of_an_interval(results: Results):
     (effect,) = results.diagnosis.effects
-    skewed = Parameter(3845.0, 1504.0, "N m/rad", even_power=-1.0)
+    skewed = Parameter(3845.0, 1504.0, "N m/rad", symmetric_power=-1.0)
     found = replace(results.diagnosis, effects=(replace(effect, parameters={"stiffness": skewed}),))
     (row,) = found.to_frame().rows(named=True)
     assert (row["low"], row["high"]) == skewed.interval

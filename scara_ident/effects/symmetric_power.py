@@ -1,4 +1,4 @@
-"""The Box-Cox power of a parameter in which its uncertainty is even.
+"""The Box-Cox power of a parameter in which its uncertainty is symmetric.
 
 Of a gear too stiff to be seen swinging the torque tells the compliance, of which the stiffness is the power -1: where the compliance
 may be all but nothing, the stiffness has no upper end. A power of 1 is the parameter itself, 0 its logarithm, as of a distance that
@@ -14,7 +14,7 @@ INTERVAL_STDS = 2.0
 # An interval is reported where an end of it is so many standard deviations from that of the value ± these: less is lost in the digit
 # that a standard deviation is written with.
 NOTICEABLE = 0.5
-# An end that is a larger factor from the value says nothing, but for the lower one of what is even in its reciprocal: that is how
+# An end that is a larger factor from the value says nothing, but for the lower one of what is symmetric in its reciprocal: that is how
 # large this may be.
 FARTHEST = 100.0
 # Logarithm that no factor exceeds: more is infinite.
@@ -22,7 +22,7 @@ LARGEST_LOG = 700.0
 
 
 def changed(value: float, way: float, power: float) -> float:
-    """Return the value so far from one, evenly in that power, in units of the parameter there.
+    """Return the value so far from one, in that power, in units of the parameter there.
 
     None, or infinite, where the power has changed its sign before.
     """

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scara_ident.effects.even_power import changed, interval
+from scara_ident.effects.symmetric_power import changed, interval
 
 DRAWS = 20000
 
