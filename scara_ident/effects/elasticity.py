@@ -206,7 +206,7 @@ class JointElasticity(BehindGear):
     def with_symmetric_powers(self, parameters: Mapping[str, Parameter]) -> Mapping[str, Parameter]:
         """Say of the stiffness how much of what is unsure of it is the frequency, and not the inertia that goes with this.
 
-        The stiffness follows the inertia, and its reciprocal the even power of the frequency.
+        The stiffness follows the inertia, and the frequency enters with its own power.
         """
         stiffness, frequency = parameters["stiffness"], parameters["frequency"]
         if not 0.0 < stiffness.std < np.inf:
