@@ -185,7 +185,7 @@ TABLES: dict[str, tuple[str, str, Callable[[Any], list[str]]]] = {
         "Arrays to parameters",
         "From positions, velocities, accelerations and torques in memory to base parameters with rotor inertia, Coulomb and "
         "viscous friction and offset of every joint. The loop calls `pin.computeJointTorqueRegressor` for every sample, keeps "
-        "all rows, and calls `numpy.linalg.qr` on the base columns, which it is told; figaroh uses its own regressor, choice "
+        "all rows, and calls `numpy.linalg.qr` on the base columns, which it is given; figaroh uses its own regressor, choice "
         "of columns and double QR. Each is given one or two BLAS threads, whichever is faster, and its arrays as it likes "
         "them. Memory is what the peak lies above that before the call.",
         arrays,

@@ -32,7 +32,7 @@ from scara_ident import identify, simulate
 from scara_ident.export.identified_model import identified_model
 from scara_ident.motion.motion import Motion
 from scara_ident.simulation.arm import ideal
-from scara_ident.use.check import CLOSE, Peak, check
+from scara_ident.use.check import CLOSE_STDS, Peak, check
 from scara_ident.use.joint_limits import joint_limits
 from scara_ident.use.tracking import RATE, at_ticks
 from scara_ident.use.trial_motion import trial_motion
@@ -82,7 +82,7 @@ class Checked:
     def kinds(self) -> tuple[int, int, int]:
         """Joints whose peak in closed loop is within 5 %, else within two stated standard deviations, and neither."""
         near = self.off(self.loop) <= WITHIN
-        stated = np.abs(self.foreseen - self.loop) <= CLOSE * np.array([each.std for each in self.peaks])
+        stated = np.abs(self.foreseen - self.loop) <= CLOSE_STDS * np.array([each.std for each in self.peaks])
         return int(near.sum()), int((~near & stated).sum()), int((~near & ~stated).sum())
 
     def row(self) -> str:

@@ -37,7 +37,7 @@ from scara_ident.errors import ScaraIdentError
 from scara_ident.estimation.least_squares import weighted_value
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.estimation.robust import robust_fit
-from scara_ident.identification.binned_residual import SLOW
+from scara_ident.identification.binned_residual import MIN_SPEED_SHARE
 from scara_ident.identification.event_search import FALSE_EVERY
 from scara_ident.identification.events import Event, find_events
 from scara_ident.identification.usable import usable_in_bands
@@ -232,7 +232,7 @@ def possible(robot: Robot, made: Set) -> Possible:
         key=lambda item: item[1].shape[1],
     )
     speed = np.abs(part.motion.v)
-    slow = np.all(speed < SLOW * np.max(speed, axis=1, keepdims=True), axis=0)
+    slow = np.all(speed < MIN_SPEED_SHARE * np.max(speed, axis=1, keepdims=True), axis=0)
     ends = np.searchsorted(part.stretch.time - run.time[0], (push.start, push.stop))
     hidden = bool(np.any(slow[np.minimum(ends, len(slow) - 1)]))
     inside = (run.time >= push.start) & (run.time <= push.stop)

@@ -28,7 +28,7 @@ from scipy.special import ndtr
 
 from scara_ident.arrays import Array
 from scara_ident.fleet.causes import TOLD_RUNS
-from scara_ident.fleet.changes import LEVEL, arms_counted, min_probability, trials_of
+from scara_ident.fleet.changes import FALSE_CHANGE_LEVEL, arms_counted, min_probability, trials_of
 from scara_ident.fleet.fleet import changes_of
 from scara_ident.fleet.folder import list_fleet
 from scara_ident.fleet.history import DateRows, History, common_removed, noise_of
@@ -125,9 +125,9 @@ def best_probabilities(known: Design, torque: Array, count: int) -> Array:
 
 
 def named_of(probabilities: Array) -> NDArray[np.bool_]:
-    """Return which of the faulty arms are named at `LEVEL`; of the others none helps."""
+    """Return which of the faulty arms are named at `FALSE_CHANGE_LEVEL`; of the others none helps."""
     whole = np.concatenate([np.minimum(1.0, probabilities), np.ones(FLEET - len(probabilities))])
-    return np.asarray(probabilities * arms_counted(list(whole)) < LEVEL)
+    return np.asarray(probabilities * arms_counted(list(whole)) < FALSE_CHANGE_LEVEL)
 
 
 def faults(fleets: int, seed: int) -> None:
@@ -168,7 +168,9 @@ def faults(fleets: int, seed: int) -> None:
         f"{'all 8 by their date':33}" + "".join(f"{np.mean([np.all(hit) for hit in hits[way]]):30.2f}" for way in ways)
     )
     print(f"{'of 8, on average':33}" + "".join(f"{np.mean([np.sum(hit) for hit in hits[way]]):30.2f}" for way in ways))
-    print(f"{false} of {named} arms named were healthy ({LEVEL * named:.1f} stated), in {spoilt} of {fleets} fleets")
+    print(
+        f"{false} of {named} arms named were healthy ({FALSE_CHANGE_LEVEL * named:.1f} stated), in {spoilt} of {fleets} fleets"
+    )
 
 
 def healthy(fleets: int, seed: int, dates: Sequence[int]) -> None:
@@ -181,10 +183,15 @@ def healthy(fleets: int, seed: int, dates: Sequence[int]) -> None:
             scatter = fleet_scatter(some)
             tried = trials_of(some[0], scatter)
             least.append([min_probability(item, scatter, tried) for item in some])
-        named = sum(arms_counted(own) * min(own) < LEVEL for own in least)
+        named = sum(arms_counted(own) * min(own) < FALSE_CHANGE_LEVEL for own in least)
         arms = np.ravel(least)
-        tail = ", ".join(f"{np.sum(arms < p)} below {p:g} ({len(arms) * p:.1f})" for p in (0.1, 0.01, LEVEL / FLEET))
-        print(f"{count} dates: {named} of {fleets} healthy fleets named an arm ({LEVEL * fleets:.1f} stated); ", end="")
+        tail = ", ".join(
+            f"{np.sum(arms < p)} below {p:g} ({len(arms) * p:.1f})" for p in (0.1, 0.01, FALSE_CHANGE_LEVEL / FLEET)
+        )
+        print(
+            f"{count} dates: {named} of {fleets} healthy fleets named an arm ({FALSE_CHANGE_LEVEL * fleets:.1f} stated); ",
+            end="",
+        )
         print(f"of {len(arms)} arms' probabilities {tail}")
 
 

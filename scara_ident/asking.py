@@ -20,7 +20,7 @@ from scara_ident.excitation.design import Design, design_excitation
 from scara_ident.excitation.known import read_diagnosis, read_parameters
 from scara_ident.excitation.limits import Limits
 from scara_ident.excitation.output import excitation_dict, write_joint_trajectory, write_trajectory
-from scara_ident.excitation.promise import SURE, ExpectedAnswer
+from scara_ident.excitation.promise import SURE_STANDARD_ERRORS, ExpectedAnswer
 from scara_ident.excitation.search import Effort, Progress
 from scara_ident.files import write_json, written_together
 from scara_ident.inquiry.answerability import Inquiry, inquiry_of
@@ -34,9 +34,9 @@ from scara_ident.robot.robot import Robot
 
 State = Literal["record", "settled", "unanswered"]
 # A motion is worth recording if it brings the answers so many times further apart than they are.
-WORTH = 1.5
+WORTHWHILE_RATIO = 1.5
 # How often recordings are asked for to answer one question, and to lower what they hardly show.
-MAX_REQUESTS, ONCE = 2, 1
+MAX_REQUESTS, MAX_LIMIT_REQUESTS = 2, 1
 NOTE = "ask.json"
 FILES = ("trajectory.csv", "trajectory.yaml", "excitation.json")
 UNFINISHED = ".scara-ident-*"
@@ -308,7 +308,7 @@ def still_open(inquiry: Inquiry, verdict: str, times: Mapping[str, int]) -> list
     """
     found = []
     for question in inquiry.questions:
-        most = ONCE if _general(question) and verdict != "undecided" else MAX_REQUESTS
+        most = MAX_LIMIT_REQUESTS if _general(question) and verdict != "undecided" else MAX_REQUESTS
         if times.get(key_of(question), 0) < most:
             found.append(question)
     return found
@@ -319,7 +319,8 @@ def worth_recording(tells: Sequence[ExpectedAnswer]) -> list[ExpectedAnswer]:
     return [
         item
         for item in tells
-        if item.after >= max(SURE, WORTH * item.before) and not 0 < len(item.question.suspects) == len(item.unshown)
+        if item.after >= max(SURE_STANDARD_ERRORS, WORTHWHILE_RATIO * item.before)
+        and not 0 < len(item.question.suspects) == len(item.unshown)
     ]
 
 

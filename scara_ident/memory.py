@@ -18,13 +18,13 @@ GIGA = 1e9
 # Of the machine's memory, where no limit is given: what is made of a recording has to have room beside it.
 SHARE = 0.5
 # Where the system does not say how much it has.
-USUAL = 8e9
-LEAST = 0.05
+USUAL_MEMORY = 8e9
+MIN_SHARE = 0.05
 # Memory that JSON takes when it is read, by its bytes: a number of three signs is an object of 24 bytes, and a place in a list.
 JSON_FACTOR = 10.0
 # Arrays up to the first size are taken from what was freed, of which the second is kept, bytes: the largest size that the C
 # library knows, and what the arrays of one recording of minutes take.
-ARRAY, KEPT = 2**25, 2**27
+ARRAY_BYTES, KEPT_BYTES = 2**25, 2**27
 # Of mallopt(3).
 _TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3
 
@@ -39,8 +39,8 @@ def set_limit(gigabytes: float | None) -> None:
     UsageError
         If it is less than what reading any file takes.
     """
-    if gigabytes is not None and not gigabytes >= LEAST:
-        raise UsageError(f"--max-memory {gigabytes:g}: expected at least {LEAST:g} GB")
+    if gigabytes is not None and not gigabytes >= MIN_SHARE:
+        raise UsageError(f"--max-memory {gigabytes:g}: expected at least {MIN_SHARE:g} GB")
     _given[:] = [] if gigabytes is None else [gigabytes * GIGA]
 
 
@@ -108,7 +108,7 @@ def keep_freed() -> None:
     with suppress(OSError, AttributeError, TypeError):
         library = ctypes.CDLL(None)
         _ = library.gnu_get_libc_version
-        for option, size in ((_TRIM_THRESHOLD, KEPT), (_MMAP_THRESHOLD, ARRAY)):
+        for option, size in ((_TRIM_THRESHOLD, KEPT_BYTES), (_MMAP_THRESHOLD, ARRAY_BYTES)):
             library.mallopt(option, size)
 
 
@@ -145,4 +145,4 @@ def _of_machine() -> float:
 
         own = resource.getrlimit(resource.RLIMIT_AS)[0]
         found += [] if own == resource.RLIM_INFINITY else [float(own)]
-    return min(found, default=USUAL)
+    return min(found, default=USUAL_MEMORY)

@@ -18,7 +18,7 @@ T = TypeVar("T")
 # Loops of NumPy hold the interpreter's lock between their calls, so that more than two threads wait for each other.
 THREADS = 2
 # Samples of an array below which an operation on it takes no longer than to hand over that lock.
-LONG = 10_000
+LONG_ARRAY = 10_000
 # Seconds after which a thread that waits for the lock asks for it: in Python's 5 ms a recording is half done.
 SOON = 2e-4
 _LOCAL = threading.local()
@@ -124,7 +124,7 @@ def works_alone() -> bool:
 
 def threads_for(samples: int) -> AbstractContextManager[None]:
     """Use both threads on arrays of so many samples where they are long, else one: two would wait for each other."""
-    return nullcontext() if samples >= LONG else one_thread()
+    return nullcontext() if samples >= LONG_ARRAY else one_thread()
 
 
 def side_by_side(function: Callable[..., T], *items: Iterable[Any]) -> list[T]:

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from scara_ident.errors import MemoryLimit, UsageError
-from scara_ident.memory import LEAST, check_memory, limit, read_text, set_limit, within_limit
+from scara_ident.memory import MIN_SHARE, check_memory, limit, read_text, set_limit, within_limit
 from scara_ident.recording.files import column_names, read_columns
 
 GIGA = 1e9
@@ -59,7 +59,7 @@ def test_the_limit_is_half_of_the_machine_unless_set():
     set_limit(None)
     assert 0.05 * GIGA < limit() < 1e15
     with pytest.raises(UsageError, match="--max-memory"):
-        set_limit(0.5 * LEAST)
+        set_limit(0.5 * MIN_SHARE)
     with pytest.raises(UsageError, match="--max-memory"):
         set_limit(float("nan"))
 

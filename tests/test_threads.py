@@ -9,7 +9,7 @@ import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from scara_ident import threads
-from scara_ident.threads import LONG, SOON, made_once, one_blas_thread, side_by_side, threads_for
+from scara_ident.threads import LONG_ARRAY, SOON, made_once, one_blas_thread, side_by_side, threads_for
 from tests.shared import PATIENCE
 
 pytestmark = pytest.mark.usefixtures("two_cores")
@@ -37,15 +37,15 @@ def test_what_is_done_to_short_arrays_is_done_in_one_thread():
         both = threading.Barrier(2)
 
         def meet(item: int) -> int:
-            if samples >= LONG:
+            if samples >= LONG_ARRAY:
                 both.wait(PATIENCE)
             return threading.get_ident()
 
         with threads_for(samples):
             return set(side_by_side(meet, range(2)))
 
-    assert len(names(LONG)) == 2
-    assert names(LONG - 1) == {threading.get_ident()}
+    assert len(names(LONG_ARRAY)) == 2
+    assert names(LONG_ARRAY - 1) == {threading.get_ident()}
 
 
 def test_threads_ask_for_the_interpreter_soon_until_the_last_caller_is_done():

@@ -33,7 +33,7 @@ def check(
     from scara_ident.export.result import read_identified
     from scara_ident.files import write_json
     from scara_ident.recording.apart import read_apart
-    from scara_ident.use.check import CLOSE, check_dict, read_motion
+    from scara_ident.use.check import CLOSE_STDS, check_dict, read_motion
     from scara_ident.use.check import check as run
     from scara_ident.use.joint_limits import joint_limits
 
@@ -53,7 +53,7 @@ def check(
         found = run(known, motion, limits)
     content = check_dict(found)
     console = result_console(content, json)
-    spread = {f"{each.joint}.torque": CLOSE * each.std for each in found.peaks}
+    spread = {f"{each.joint}.torque": CLOSE_STDS * each.std for each in found.peaks}
     rows = table("limits", "limit", "reached", "bound", "at [s]", "used", right=("reached", "bound", "at [s]", "used"))
     for each in found.margins:
         used = "-" if each.share is None else f"{each.share:.0%}"

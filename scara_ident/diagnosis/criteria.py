@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, fields
 from typing import Any
 
-from scara_ident.effects.spanned import ABSORBED
+from scara_ident.effects.spanned import ABSORBED_SHARE
 
 # Where nothing else is cited.
 CHOSEN = "chosen; docs/criteria.md shows what it moves"
@@ -24,7 +24,7 @@ class SelectionCriteria:
 
     # Letting an effect in.
     absorbed: float = _criterion(
-        ABSORBED,
+        ABSORBED_SHARE,
         "share of its square",
         "of less of a column outside the model only rounding is left",
         "effects/spanned.py: above what a URDF loses by few digits",

@@ -27,7 +27,7 @@ from scara_ident.robot.robot import Robot
 # Share of the arm's size by which places of the mass are told apart before they are fitted.
 RESOLUTION = 0.1
 # No last link reaches farther, m; what an arm can have is said by its size.
-FARTHEST = 10.0
+MAX_REACH = 10.0
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class CompactPayload(PayloadOfRecordings):
     """
 
     nonlinear: ClassVar[tuple[NonlinearParameter, ...]] = tuple(
-        NonlinearParameter(f"com_{axis}", "m", -FARTHEST, FARTHEST, False) for axis in "xyz"
+        NonlinearParameter(f"com_{axis}", "m", -MAX_REACH, MAX_REACH, False) for axis in "xyz"
     )
 
     def members(self, scene: Scene) -> tuple[Member, ...]:

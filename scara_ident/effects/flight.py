@@ -34,7 +34,7 @@ from scara_ident.motion.motion import Motion
 # The link's lag keeps this many times the band: beyond it its second derivative is noise.
 LAG_BAND = 1.5
 # Samples of a flight that are looked at first.
-REACH = 64
+FIRST_SAMPLES = 64
 
 Lag = tuple[Array, Array, Array]
 
@@ -207,7 +207,7 @@ def _fly(
     result: Array,
 ) -> tuple[int, float]:
     """Fill the flight that begins at a sample, and return the sample at which it has ended, and on which flank."""
-    reach = REACH
+    reach = FIRST_SAMPLES
     while True:
         # A recording may have hundreds of short flights: what is the same in all of them is made before.
         stop = min(first + reach, len(drift))

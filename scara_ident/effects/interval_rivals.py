@@ -19,11 +19,11 @@ from scara_ident.motion.motion import Motion
 from scara_ident.robot.kinematics import force_torques
 
 # A weight that hangs from a tool that hardly turns is a constant force: one that explains less than so much more is no other.
-ALIKE = 0.05
+MIN_ADVANTAGE = 0.05
 # Intervals that are asked at the most, those that show the body most: their columns are as many times more.
 MAX_INTERVALS = 12
 # Twice a logarithm of odds: very strong evidence (Kass and Raftery 1995).
-STRONG = 10.0
+STRONG_EVIDENCE = 10.0
 
 # Of a recording's name the intervals to ask about: number, begin and end in s since it began.
 Asked = dict[str, list[tuple[int, float, float]]]
@@ -61,7 +61,7 @@ def beaten(scene: Scene, shown: Sequence[int], cells: Cells, asked: Asked, scatt
         instead = squares(other)
         determined = int(np.count_nonzero(np.einsum("qa,ab,qb->q", other, spread, other) > 0.0))
         pressed = other is force or other is forces
-        if instead - cost * determined > alone + max(STRONG, ALIKE * alone if pressed else 0.0):
+        if instead - cost * determined > alone + max(STRONG_EVIDENCE, MIN_ADVANTAGE * alone if pressed else 0.0):
             return True
         if not pressed and squares(body, other) - instead < cost * k:
             return True

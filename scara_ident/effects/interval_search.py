@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
-from scara_ident.effects.interval_rivals import MAX_INTERVALS, STRONG, Asked, beaten
+from scara_ident.effects.interval_rivals import MAX_INTERVALS, STRONG_EVIDENCE, Asked, beaten
 from scara_ident.effects.last_link_cells import Cells, cells_of
 from scara_ident.effects.parameters import Interval
 from scara_ident.effects.recording_groups import inverse_of
@@ -23,7 +23,7 @@ from scara_ident.effects.signals import Scene
 from scara_ident.effects.two_states import instants, likeliest, scatter_of, spans
 
 # The first intervals tried begin and end on a grid of these seconds, and are so many of them long at the most.
-GRID, LONGEST = 1.0, 24
+GRID_SECONDS, MAX_GRID_STEPS = 1.0, 24
 # A search begins where so many of each of so many recordings explain most: from single ones it may end where less is explained.
 BEGINS, RECORDINGS = 2, 4
 # Where a search begins squares of noise are taken for so much of all that the base model leaves: a body that is carried most of
@@ -32,7 +32,7 @@ OF_NOISE = 0.03
 # A search ends where nothing changes, mostly after four rounds.
 ROUNDS = 20
 # Nobody takes something up for less than this, s.
-SHORTEST = 0.3
+MIN_SECONDS = 0.3
 # Directions of a body's columns of unit size below this share are not identifiable.
 _RANK = 1e-6
 
@@ -82,7 +82,7 @@ def carried(scene: Scene, shown: Sequence[int]) -> tuple[Interval, ...]:
         return ()
     cells = cells_of(scene, shown)
     best = max(_settled(cells, *_begins(cells)), key=lambda item: item.worth, default=None)
-    if best is None or best.worth < STRONG + len(shown) * _cost(cells):
+    if best is None or best.worth < STRONG_EVIDENCE + len(shown) * _cost(cells):
         return ()
     said = best if _positive(best, shown) else _turned(best)
     if beaten(scene, shown, cells, _asked(cells, said), said.scatter):
@@ -95,7 +95,7 @@ def _begins(cells: Cells) -> tuple[list[Array], Array]:
     value, found = cells.inverse @ cells.aim, []
     for run, item in enumerate(cells.each):
         count = len(item.bounds) - 1
-        grid = np.unique(np.linspace(0, count, max(8, int(item.bounds[-1] / GRID)) + 1).astype(int))
+        grid = np.unique(np.linspace(0, count, max(8, int(item.bounds[-1] / GRID_SECONDS)) + 1).astype(int))
         # What all cells before a place of the grid say; of an interval it is the difference.
         squares, across, sums = (_before(table, grid) for table in (item.squares, item.across, item.sums))
         share = (cells.weights / np.maximum(item.rows, 1.0))[:, None] * sums
@@ -104,7 +104,7 @@ def _begins(cells: Cells) -> tuple[list[Array], Array]:
         beside = np.concatenate([reach, sums.swapaxes(1, 2)], axis=2)
         taken = np.concatenate([reach @ cells.inverse, share.swapaxes(1, 2)], axis=2)
         parts = []
-        for long in range(1, min(LONGEST, len(grid) - 2) + 1):
+        for long in range(1, min(MAX_GRID_STEPS, len(grid) - 2) + 1):
             spread, aim, off, there = (table[long:] - table[:-long] for table in (squares, right, taken, beside))
             parts.append((spread - off @ there.swapaxes(1, 2), aim, grid[:-long], grid[long:]))
         if parts:
@@ -114,7 +114,7 @@ def _begins(cells: Cells) -> tuple[list[Array], Array]:
             found.append([(float(gain[k]), run, first[k], stop[k], body[k]) for k in np.argsort(-gain)[:BEGINS]])
     most = sorted(found, key=lambda own: -own[0][0])[:RECORDINGS]
     # An interval has to pay for two changes; where none does as much as for one, what the base model leaves has no structure.
-    begins = [one for own in most for one in own] if most and most[0][0][0] >= STRONG + _cost(cells) else []
+    begins = [one for own in most for one in own] if most and most[0][0][0] >= STRONG_EVIDENCE + _cost(cells) else []
     states = [np.zeros((len(begins), len(item.bounds) - 1)) for item in cells.each]
     for state, (_, run, *edges, _) in enumerate(begins):
         states[run][state, slice(*edges)] = 1.0
@@ -174,10 +174,10 @@ def _long(state: Array, bounds: Array) -> Array:
     """Return it without stretches, or gaps between them, that are too short."""
     state = state.copy()
     for a, b in spans(1.0 - state):
-        if bounds[b] - bounds[a] < SHORTEST:
+        if bounds[b] - bounds[a] < MIN_SECONDS:
             state[a:b] = 1.0
     for a, b in spans(state):
-        if bounds[b] - bounds[a] < SHORTEST:
+        if bounds[b] - bounds[a] < MIN_SECONDS:
             state[a:b] = 0.0
     return state
 

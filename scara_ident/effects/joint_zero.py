@@ -19,7 +19,7 @@ from scara_ident.model.model import TorqueModel
 from scara_ident.model.terms import joint_rows
 from scara_ident.motion.motion import Motion
 
-# Shift of a joint's zero, rad or m, for a central difference: its error, the step squared, lies far below `ABSORBED`.
+# Shift of a joint's zero, rad or m, for a central difference: its error, the step squared, lies far below `ABSORBED_SHARE`.
 ZERO_STEP = 1e-4
 # A change that is a smaller share of the torque is what rounding leaves of none.
 ROUNDING = 1e-12

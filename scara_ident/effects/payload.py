@@ -14,7 +14,7 @@ from scara_ident.effects.effect import DOUBT_STDS, Effect
 from scara_ident.effects.links import point_mass, shared, tool_of
 from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, Parameter, View, deviation
 from scara_ident.effects.periodic import TorqueRipple
-from scara_ident.effects.recording_groups import SLOWEST, groups_by_torque
+from scara_ident.effects.recording_groups import MIN_SPEED_SHARE, groups_by_torque
 from scara_ident.effects.signals import Scene, Signals
 from scara_ident.effects.sinusoid import Sinusoid
 from scara_ident.effects.spanned import rows_by_sample
@@ -290,7 +290,7 @@ def _rest_about(scene: Scene, motion: Motion, instant: float) -> float:
     """Return how long joints rest about an instant of a recording that a mass at the tool loads, s; infinite off the motion."""
     time = motion.time - scene.start.get(motion.name, float(motion.time[0]))
     load = np.sqrt(np.mean(_at_tool(Signals(scene, motion)) ** 2, axis=1)) / np.abs(scene.robot.row_scale)
-    moving = np.abs(motion.v) >= SLOWEST * scene.speed[:, None]
+    moving = np.abs(motion.v) >= MIN_SPEED_SHARE * scene.speed[:, None]
     telling = time[np.any(moving[load >= LOADED * np.max(load)], axis=0)]
     place = int(np.searchsorted(telling, instant))
     return float(telling[place] - telling[place - 1]) if 0 < place < len(telling) else np.inf

@@ -26,9 +26,9 @@ CHANCE = 0.01
 # The last groups to be joined are proposed: four payloads are told apart.
 MAX_GROUPS = 3
 # What one recording may have more than another, as a multiple of the arm: so weak that only what nobody excites feels it.
-WIDE = 3.0
+PRIOR_RATIO = 3.0
 # Slower than this share of a joint's largest speed the direction of friction is not sure.
-SLOWEST = 0.01
+MIN_SPEED_SHARE = 0.01
 # Directions of columns of unit size below this share are rounding.
 _RANK = 1e-11
 # Fits, each weighted by what the last leaves of each joint.
@@ -204,7 +204,7 @@ def half_periods(scene: Scene, motion: Motion) -> tuple[int, Array, NDArray[np.b
         Samples in one, when each begins, s, shape (M,), and in which each joint is so fast that its friction is sure, (n, M).
     """
     step = max(1, int(0.5 * motion.rate / scene.band))
-    slow = np.abs(motion.v) < SLOWEST * scene.speed[:, None]
+    slow = np.abs(motion.v) < MIN_SPEED_SHARE * scene.speed[:, None]
     sure = means_of(slow, step) == 0.0
     return step, motion.time[: sure.shape[1] * step : step], sure
 
@@ -218,4 +218,4 @@ def means_of(rows: NDArray[Any], step: int) -> Array:
 def _prior(scene: Scene, shown: Sequence[int]) -> Array:
     """Return the standard deviation of what one recording may have more than another."""
     weight = max(float(np.sum(scene.robot.standard_parameters()[: 10 * scene.robot.n : 10])), 1.0)
-    return np.asarray(WIDE * weight * np.array([1.0, *[0.5] * 3, *[0.25] * 6])[list(shown)])
+    return np.asarray(PRIOR_RATIO * weight * np.array([1.0, *[0.5] * 3, *[0.25] * 6])[list(shown)])

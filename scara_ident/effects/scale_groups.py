@@ -7,13 +7,13 @@ from functools import lru_cache
 
 import numpy as np
 
-from scara_ident.effects.spanned import ABSORBED, random_motion, rows_by_sample
+from scara_ident.effects.spanned import ABSORBED_SHARE, random_motion, rows_by_sample
 from scara_ident.model.terms import RigidBody
 
 # Of a direction that all rows leave out only rounding is left, as a share of the largest singular value.
 ROUNDING = 1e-6
 # Joints of one group are wholly correlated in what no row says, and those of two not at all.
-TOGETHER = 0.5
+SAME_GROUP_SHARE = 0.5
 
 
 @lru_cache(maxsize=16)
@@ -53,13 +53,13 @@ def scale_groups(term: RigidBody, moving: tuple[bool, ...]) -> tuple[tuple[int, 
     basis = left[:, singular > ROUNDING * singular[0]]
     outside = alone - basis @ (basis.T @ alone)
     share = np.linalg.norm(outside, axis=0)
-    determined = np.flatnonzero(share**2 >= ABSORBED)
+    determined = np.flatnonzero(share**2 >= ABSORBED_SHARE)
     _, singular, right = np.linalg.svd(outside[:, determined] / share[determined], full_matrices=False)
     null = right[singular <= ROUNDING * max(singular, default=0.0)]
     common = null.T @ null
     groups = [(j,) for j in range(robot.n) if j not in determined]
     for place, j in enumerate(determined):
-        own = np.abs(common[place]) > TOGETHER * np.sqrt(common[place, place] * np.diag(common))
+        own = np.abs(common[place]) > SAME_GROUP_SHARE * np.sqrt(common[place, place] * np.diag(common))
         own[place] = True
         if determined[own][:1].tolist() == [j]:
             groups.append(tuple(determined[own].tolist()))

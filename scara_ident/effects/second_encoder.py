@@ -23,7 +23,7 @@ from scara_ident.motion.low_pass import differentiate
 from scara_ident.motion.prepared import PreparedRecording, PreparedStretch
 
 # Share of a stretch's samples that the second encoder must have.
-KNOWN = 0.99
+MIN_KNOWN_SHARE = 0.99
 # A stiffness is significant from this many standard deviations, where noise is at most this share of the lag's square, and the torque
 # that the gear passes on explains this share of it, which that of a clearance does not.
 MIN_STDS, MAX_NOISE, MIN_EXPLAINED = 5.0, 0.02, 0.8
@@ -119,7 +119,7 @@ def _lag(item: PreparedRecording, part: PreparedStretch, joint: int) -> Array | 
     assert record.link_position is not None
     time, link = record.time[inside], record.link_position[joint][inside]
     known = np.isfinite(link)
-    if np.count_nonzero(known) < KNOWN * len(known):
+    if np.count_nonzero(known) < MIN_KNOWN_SHARE * len(known):
         return None
     lag = record.position[joint][inside][known] - link[known]
     return np.asarray(np.interp(part.stretch.time, time[known], lag))

@@ -12,7 +12,7 @@ from scara_ident.motion.motion import Motion
 from scara_ident.robot.robot import Robot
 
 # Share of an effect's square outside the model below which it is absorbed; above what a URDF loses by few digits.
-ABSORBED = 1e-6
+ABSORBED_SHARE = 1e-6
 # Parameters that carry less than this share of the effect are not named.
 NAMED_SHARE = 1e-4
 
@@ -63,6 +63,6 @@ class Span:
             return []
         rows = rows / np.linalg.norm(rows, axis=0)
         sums = self.inverse @ rows
-        if np.any(np.sum((rows - self.unit @ sums) ** 2, axis=0) >= ABSORBED):
+        if np.any(np.sum((rows - self.unit @ sums) ** 2, axis=0) >= ABSORBED_SHARE):
             return None
         return [int(self.entering[k]) for k in np.flatnonzero(np.any(np.abs(sums) > NAMED_SHARE, axis=1))]

@@ -13,10 +13,10 @@ import numpy as np
 INTERVAL_STDS = 2.0
 # An interval is reported where an end of it is so many standard deviations from that of the value ± these: less is lost in the digit
 # that a standard deviation is written with.
-NOTICEABLE = 0.5
+NOTICEABLE_STDS = 0.5
 # An end that is a larger factor from the value says nothing, but for the lower one of what is symmetric in its reciprocal: that is how
 # large this may be.
-FARTHEST = 100.0
+MAX_INTERVAL_FACTOR = 100.0
 # Logarithm that no factor exceeds: more is infinite.
 LARGEST_LOG = 700.0
 
@@ -46,7 +46,7 @@ def interval(value: float, std: float, power: float) -> tuple[float, float] | No
         return None
     reach = INTERVAL_STDS * std
     low, high = (changed(value, way, power) for way in (-reach, reach))
-    if max(abs(low - (value - reach)), abs(high - (value + reach))) < NOTICEABLE * std:
+    if max(abs(low - (value - reach)), abs(high - (value + reach))) < NOTICEABLE_STDS * std:
         return None
-    bounded = power < 0.0 or low > value / FARTHEST
-    return (low if bounded else -np.inf), (high if high < value * FARTHEST else np.inf)
+    bounded = power < 0.0 or low > value / MAX_INTERVAL_FACTOR
+    return (low if bounded else -np.inf), (high if high < value * MAX_INTERVAL_FACTOR else np.inf)

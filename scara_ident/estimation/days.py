@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from scara_ident.arrays import Array
 
 # Of days whose runs are all of one so few have two that lie further apart, by chance.
-APART = 0.01
+SAME_DAY_LEVEL = 0.01
 # Of two draws of their own so many lie so near each other by chance.
-NEAR = 0.05
+DIFFERENT_DAYS_LEVEL = 0.05
 
 
 def same_day(offsets: Array, unsure: Array, std: Array) -> NDArray[np.intp] | None:
@@ -41,8 +41,8 @@ def same_day(offsets: Array, unsure: Array, std: Array) -> NDArray[np.intp] | No
     from scipy.special import chdtri
 
     first, second = np.triu_indices(runs, 1)
-    chance = float(chdtri(joints, APART / len(first))) * (unsure[:, first] + unsure[:, second])
-    near = float(chdtri(joints, 1.0 - NEAR)) * 2.0 * std[:, None] ** 2
+    chance = float(chdtri(joints, SAME_DAY_LEVEL / len(first))) * (unsure[:, first] + unsure[:, second])
+    near = float(chdtri(joints, 1.0 - DIFFERENT_DAYS_LEVEL)) * 2.0 * std[:, None] ** 2
     apart = np.sum((offsets[:, first] - offsets[:, second]) ** 2 / (chance + near), axis=0)
     day = fcluster(linkage(apart, "complete"), 1.0, "distance").astype(np.intp)
     return day if 1 < day.max() < runs else None

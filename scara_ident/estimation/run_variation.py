@@ -43,7 +43,7 @@ MIN_RUNS = 3
 # Of differences below this share of the torque nothing is said in words.
 SPOKEN_OF = 0.01
 # Delays of runs whose mean is so many of their standard deviations are one delay: no parameter takes up their mean.
-ALIKE = 2.0
+COMMON_DELAY_STDS = 2.0
 # Probability, by Student's t of so many runs, below which chance does not make their mean: three runs whose mean is two of their
 # standard deviations, no more likely to be late than early, are had once in fourteen times.
 CHANCE = 0.01
@@ -342,7 +342,7 @@ def late_by_few(item: JointVariation) -> float:
     """Return by how much runs are late in the mean, s, where they differ little in it, be that chance; 0 where they do not."""
     late = item.of_run[:, DELAY]
     mean, apart = float(np.mean(late)), float(np.std(late, ddof=1))
-    return mean if abs(mean) >= ALIKE * apart else 0.0
+    return mean if abs(mean) >= COMMON_DELAY_STDS * apart else 0.0
 
 
 def late_words(item: JointVariation, late: float) -> str:

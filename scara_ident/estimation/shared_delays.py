@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 
-# Probability below which chance does not make pooled delays differ, as `scara_ident.estimation.variance_components.CHANCE`.
+# Probability below which chance does not make pooled delays differ, as `scara_ident.estimation.variance_components.LIKELIHOOD_RISE`.
 CHANCE = 0.01
 # Share of its own squares that a delay must have left beside other kinds of difference, or rounding is taken for it.
 MIN_INDEPENDENT_SHARE = 1e-6

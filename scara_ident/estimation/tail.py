@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scara_ident.arrays import Array
 
 # Exceedances closer than this, s, are one cluster, and one alarm.
-TOGETHER = 0.5
+CLUSTER_SECONDS = 0.5
 # Clusters that the tail is fitted to, if there are as many: a share of the seconds recorded, within bounds.
 CLUSTER_SHARE, MIN_CLUSTERS, MAX_CLUSTERS = 0.1, 20, 400
 # Levels that are tried for that.
@@ -105,7 +105,7 @@ def fit_tail(times: Sequence[Array], scores: Sequence[Array], seconds: float, ra
         CLUSTERS_OVER_RATE * rate * seconds / HOUR,
     )
     # One after the other, far enough apart for no cluster to be of two.
-    starts = np.cumsum([0.0, *(float(np.ptp(time)) + 2.0 * TOGETHER for time in times[:-1])])
+    starts = np.cumsum([0.0, *(float(np.ptp(time)) + 2.0 * CLUSTER_SECONDS for time in times[:-1])])
     time = np.concatenate([own - own[0] + start for own, start in zip(times, starts, strict=True)])
     score = np.concatenate(scores)
     # The number of clusters grows as the level falls, until they meet.
@@ -163,10 +163,10 @@ def peaks(time: Array, score: Array, level: float) -> Array:
 
 
 def clusters(time: Array, score: Array, level: float) -> list[tuple[int, int]]:
-    """Return first and last sample of each cluster above a level, which `TOGETHER` parts from the next."""
+    """Return first and last sample of each cluster above a level, which `CLUSTER_SECONDS` parts from the next."""
     above: NDArray[np.intp] = np.flatnonzero(score > level)
     if len(above) == 0:
         return []
-    cuts = np.flatnonzero(np.diff(time[above]) > TOGETHER)
+    cuts = np.flatnonzero(np.diff(time[above]) > CLUSTER_SECONDS)
     firsts, lasts = above[np.r_[0, cuts + 1]], above[np.r_[cuts, len(above) - 1]]
     return [(int(first), int(last)) for first, last in zip(firsts, lasts, strict=True)]

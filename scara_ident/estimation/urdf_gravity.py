@@ -10,7 +10,7 @@ import numpy as np
 from scara_ident.arrays import Array
 from scara_ident.estimation.information import triangular
 from scara_ident.estimation.observations import Observations
-from scara_ident.estimation.urdf_scale import SURE, USUAL
+from scara_ident.estimation.urdf_scale import SIGNIFICANT_STDS, USUAL
 from scara_ident.model.urdf_torque import urdf_torques
 
 # Gravity of less than this share of the stated one is none: a controller subtracts it as well as it knows masses.
@@ -64,7 +64,9 @@ class UrdfGravity:
         size = np.linalg.norm(self.stated)
         along = self.stated / size
         std = np.sqrt(along @ self.covariance @ along)
-        return bool(self._as_heavy and np.linalg.norm(self.found) < NONE * size and SURE * std < NONE * size)
+        return bool(
+            self._as_heavy and np.linalg.norm(self.found) < NONE * size and SIGNIFICANT_STDS * std < NONE * size
+        )
 
     @property
     def elsewhere(self) -> bool:
@@ -74,7 +76,8 @@ class UrdfGravity:
             # Gravity the other way round is a ceiling, or efforts of opposite sign, which inertia tells apart.
             self._as_heavy
             and size / USUAL < found < size * USUAL
-            and np.sqrt(np.max(np.linalg.eigvalsh(self.covariance))) * SURE < found * np.sin(np.radians(TURNED))
+            and np.sqrt(np.max(np.linalg.eigvalsh(self.covariance))) * SIGNIFICANT_STDS
+            < found * np.sin(np.radians(TURNED))
             and self.degrees > TURNED
             and self.left < FAR_LESS * self.stated_left
         )
@@ -91,9 +94,10 @@ class UrdfGravity:
         size, found = np.linalg.norm(self.stated), np.linalg.norm(self.found)
         return bool(
             1.0 / USUAL < -self.inertia < USUAL
-            and -self.inertia > SURE * self.inertia_std
+            and -self.inertia > SIGNIFICANT_STDS * self.inertia_std
             and size / USUAL < found < size * USUAL
-            and np.sqrt(np.max(np.linalg.eigvalsh(self.covariance))) * SURE < found * np.sin(np.radians(TURNED))
+            and np.sqrt(np.max(np.linalg.eigvalsh(self.covariance))) * SIGNIFICANT_STDS
+            < found * np.sin(np.radians(TURNED))
             and self.degrees > 180.0 - TURNED
             and self.left < FAR_LESS * self.stated_left
         )
@@ -101,7 +105,7 @@ class UrdfGravity:
     @property
     def _as_heavy(self) -> bool:
         """Whether inertia is determined, and about that of the URDF."""
-        return 1.0 / USUAL < self.inertia < USUAL and self.inertia > SURE * self.inertia_std
+        return 1.0 / USUAL < self.inertia < USUAL and self.inertia > SIGNIFICANT_STDS * self.inertia_std
 
 
 def urdf_gravity(observations: Observations) -> UrdfGravity | None:

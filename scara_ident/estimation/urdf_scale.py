@@ -18,13 +18,13 @@ from scara_ident.robot.robot import Robot
 # The URDF's torque tells the scale of a joint where it leaves less than this share of the identified bodies' torque.
 MAX_UNEXPLAINED = 0.5
 # A scale is significant where it is so many of its standard deviations.
-SURE = 5.0
+SIGNIFICANT_STDS = 5.0
 # Torques of gravity below this, N m for each kg, are rounding.
 ROUNDING = 1e-9
 # A scale within this factor of 1 is what a URDF with rough masses gives.
 USUAL = 2.0
 # Joints within this factor of their middle are scaled alike.
-ALIKE = 1.5
+SAME_SCALE_FACTOR = 1.5
 # Torque of the bodies below this share of that of the joint that bears most is as much as a centre of mass a little off makes.
 SLIGHT = 0.01
 
@@ -100,10 +100,12 @@ def joint_scales(estimate: Estimate, observations: Observations) -> dict[str, Jo
         own_size = float(np.linalg.norm(identified))
         left = float(np.linalg.norm(identified - scale * nominal))
         spread = float(np.sum(columns * (estimate.covariance[np.ix_(own, own)] @ columns)))
-        sure = left > SURE * np.sqrt(max(0.0, spread))
+        sure = left > SIGNIFICANT_STDS * np.sqrt(max(0.0, spread))
         count = np.sqrt(nominal.size)
         left = left / own_size if own_size else np.inf
-        found[joint] = JointScale(scale, abs(scale) > SURE * std, sure, left, own_size / count, np.sqrt(size) / count)
+        found[joint] = JointScale(
+            scale, abs(scale) > SIGNIFICANT_STDS * std, sure, left, own_size / count, np.sqrt(size) / count
+        )
     return found
 
 
@@ -156,7 +158,7 @@ def friction_sides(estimate: Estimate, observations: Observations) -> FrictionSi
             # Of a covariance rounding may leave less than nothing along what is known best.
             variance = max(0.0, float(taken @ estimate.covariance[np.ix_(places, places)] @ taken))
             energy = float(taken @ estimate.value[places])
-            if abs(energy) > SURE * np.sqrt(variance):
+            if abs(energy) > SIGNIFICANT_STDS * np.sqrt(variance):
                 (brakes if energy > 0.0 else pushes).append(joint)
     return FrictionSides(tuple(brakes), tuple(pushes))
 
@@ -271,4 +273,4 @@ def _alike(scales: Iterable[float]) -> bool:
     if np.any(size <= 0.0):
         return False
     middle = float(np.exp(np.median(np.log(size))))
-    return bool(np.all(size < ALIKE * middle) and np.all(size > middle / ALIKE))
+    return bool(np.all(size < SAME_SCALE_FACTOR * middle) and np.all(size > middle / SAME_SCALE_FACTOR))

@@ -14,8 +14,8 @@ from scara_ident.arrays import Array
 from scara_ident.estimation.estimate import Estimate
 from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.urdf_scale import (
-    ALIKE,
-    SURE,
+    SAME_SCALE_FACTOR,
+    SIGNIFICANT_STDS,
     USUAL,
     friction_sides,
     scale_sentence,
@@ -104,10 +104,10 @@ def otherwise_loaded(estimate: Estimate, observations: Observations) -> dict[str
         apart, unsure = (np.sqrt(max(0.0, float(s @ among @ s))) for s in (shares[0] - shares[1], shares[1]))
         if (
             1.0 / USUAL < inert < HEAVIEST
-            and inert > SURE * unsure
+            and inert > SIGNIFICANT_STDS * unsure
             and not 1.0 / USUAL < heavy < USUAL
-            and abs(heavy - inert) > SURE * apart
-            and not inert / ALIKE < heavy < inert * ALIKE
+            and abs(heavy - inert) > SIGNIFICANT_STDS * apart
+            and not inert / SAME_SCALE_FACTOR < heavy < inert * SAME_SCALE_FACTOR
         ):
             found[joint] = WeightScale(heavy, inert)
     return found
@@ -142,7 +142,7 @@ def _other_rotors(estimate: Estimate) -> dict[str, str]:
         alone = np.count_nonzero(rigid.base.grouping[rigid.kept[k]]) == 1
         if j < 0 or not alone or not stated > 0.0 or estimate.undetermined[place][k]:
             continue
-        if not abs(value - stated) > max(SURE * std, ROTOR * stated):
+        if not abs(value - stated) > max(SIGNIFICANT_STDS * std, ROTOR * stated):
             continue
         unit = "kg" if robot.prismatic[j] and robot.reduction[j] == 1.0 else "kg m^2"
         was, now, spread = (number / robot.reduction[j] ** 2 for number in (stated, value, std))

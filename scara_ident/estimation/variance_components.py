@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scara_ident.arrays import Array
 
 # Rise of twice the logarithm of the likelihood below which chance explains a component, which cannot be negative: 1 %.
-CHANCE = 5.41
+LIKELIHOOD_RISE = 5.41
 # Steps of expectation and maximisation; each takes a share of what is left.
 STEPS = 40
 
@@ -43,7 +43,7 @@ def differing(products: Array, aims: Array, kept: NDArray[np.bool_], draws: Arra
         while place:
             fewer = [place & ~(1 << kind) for kind in range(kinds) if place >> kind & 1]
             likeliest = max(fewer, key=lambda other: float(likelihoods[joint, other]))
-            if not 2.0 * (likelihoods[joint, place] - likelihoods[joint, likeliest]) <= CHANCE:
+            if not 2.0 * (likelihoods[joint, place] - likelihoods[joint, likeliest]) <= LIKELIHOOD_RISE:
                 break
             place = likeliest
         found[joint] = variances[joint, place] > 0.0

@@ -33,7 +33,7 @@ from scara_ident.recording.pieces import of_one_run
 from scara_ident.threads import side_by_side
 
 # Beside delays that joints share reversals and viscous friction are free in every run.
-FREE = 2
+FREE_KINDS = 2
 
 
 def run_variation(
@@ -136,7 +136,7 @@ def _shared(
     if not determined:
         return None
     kinds = len(KINDS)
-    priors = np.zeros((len(determined), kinds + FREE))
+    priors = np.zeros((len(determined), kinds + FREE_KINDS))
     for place, (own, item) in enumerate(determined):
         if item is not None:
             priors[place, :kinds] = (item.std / np.where(own.back[:kinds] > 0.0, own.back[:kinds], np.inf)) ** 2

@@ -27,7 +27,7 @@ from scara_ident.model.urdf_values import urdf_values
 from scara_ident.motion.motion import Motion
 
 # The drive's torque is so many standard deviations of what is known without data.
-SURE = 3.0
+DRIVE_STDS = 3.0
 # How many times the friction recorded each of its terms may be, anywhere in the range: one standard deviation.
 MAX_FRICTION_RATIO = 2.0
 # Random states per parameter that stand for the range.
@@ -35,7 +35,7 @@ STATES_PER_PARAMETER = 8
 # An open share of a parameter's variance, as it is known without data, above which the parameter is called undetermined.
 OPEN_SHARE = 0.5
 # What moves the torques over the arm's range by less than this share of them leaves the estimate as it is, and what was made of it.
-SAME = 1e-3
+SAME_TORQUE_SHARE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +62,7 @@ class DeterminedDirections:
     @property
     def prior(self) -> Array:
         """Covariance of what is left open, shape (p, p)."""
-        return np.asarray(self.left_open @ self.left_open.T) / SURE**2
+        return np.asarray(self.left_open @ self.left_open.T) / DRIVE_STDS**2
 
     def within(self, information: Information) -> Information:
         """Return information of the coordinates along the directions kept."""
@@ -94,7 +94,7 @@ def determined_directions(observations: Observations, noise: Array) -> Determine
     _, singular, right = np.linalg.svd(whole.regressor_factor @ range_)
     some = int(np.count_nonzero(singular > UNDETERMINED * singular[0]))
     std = np.sqrt(rows.sum() / max(int(rows.sum()) - parameters, 1)) / singular[:some]
-    known = SURE * std <= 1.0
+    known = DRIVE_STDS * std <= 1.0
     # What no row shows at all is open anyway, see `Information.solve`.
     if np.all(known):
         return None
@@ -133,7 +133,7 @@ def believable(observations: Observations, value: Array, noise: Array) -> Array:
     for term in model.terms:
         rubbing[model.place(term)] = isinstance(term, Friction)
     data = weighted(observations.by_joint, 1.0 / np.sqrt(noise * rate)).regressor_factor
-    known = [SURE * (rows / (drive[:, None, None] * np.sqrt(len(rows)))).reshape(-1, len(value))]
+    known = [DRIVE_STDS * (rows / (drive[:, None, None] * np.sqrt(len(rows)))).reshape(-1, len(value))]
     for own, torque in zip(observations.joints, rows, strict=True):
         size = float(np.sqrt(np.mean((torque @ aim) ** 2)))
         if size > 0.0:
@@ -146,7 +146,9 @@ def believable(observations: Observations, value: Array, noise: Array) -> Array:
     before = np.vstack(known) / np.sqrt(rows.shape[1])
     wanted = np.concatenate([data @ value, before @ aim])
     found = np.asarray(np.linalg.lstsq(np.vstack([data, before]), wanted, rcond=None)[0])
-    moved = (np.linalg.norm(torque @ (found - value)) > SAME * np.linalg.norm(torque @ value) for torque in rows)
+    moved = (
+        np.linalg.norm(torque @ (found - value)) > SAME_TORQUE_SHARE * np.linalg.norm(torque @ value) for torque in rows
+    )
     return found if any(moved) else value
 
 

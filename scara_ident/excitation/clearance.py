@@ -25,7 +25,7 @@ from scara_ident.robot.robot import Robot
 Box = tuple[tuple[float, float, float], tuple[float, float, float]]
 
 # Distances are told apart up to so much more than the margin, m.
-REACH = 0.05
+WATCHED_DISTANCE = 0.05
 # Pairs count by this power of their room: the larger, the more the nearest alone.
 POWER = 2.0
 # Of Coal's search for nearest points, m.
@@ -191,7 +191,7 @@ class Clearance(Frozen):
     @property
     def reach(self) -> float:
         """Distance from which on there is room enough, m."""
-        return self.margin + REACH
+        return self.margin + WATCHED_DISTANCE
 
     def rows(self, found: Nearest, samples: int) -> Array:
         """Return what is within reach as rows of limits, 1 at the margin and 0 where there is room, shape (G, N).
@@ -199,7 +199,7 @@ class Clearance(Frozen):
         The rooms of all pairs of a group make up one that is a little less than the least of them, and none where that is
         none, and that changes smoothly when another pair becomes the nearest. Where a pair is too near the worst counts alone.
         """
-        room = (found.distance - self.margin) / REACH
+        room = (found.distance - self.margin) / WATCHED_DISTANCE
         place = self._group[found.pair], found.place
         least, parallel = np.ones((2, len(self.groups), samples))
         np.minimum.at(least, place, room)
@@ -210,8 +210,8 @@ class Clearance(Frozen):
         """Return the derivative of the rows by the joints where nothing is too near, shape (G, n, N)."""
         slope = np.zeros((len(self.groups), q.shape[1], len(q)))
         place = self._group[found.pair], found.place
-        share = (1.0 - self.rows(found, q.shape[1])[place]) * REACH / (found.distance - self.margin)
-        np.add.at(slope, place, -self.gradients(q, found) * (share ** (POWER + 1.0) / REACH)[:, None])
+        share = (1.0 - self.rows(found, q.shape[1])[place]) * WATCHED_DISTANCE / (found.distance - self.margin)
+        np.add.at(slope, place, -self.gradients(q, found) * (share ** (POWER + 1.0) / WATCHED_DISTANCE)[:, None])
         return slope.transpose(0, 2, 1)
 
     def gradients(self, q: Array, found: Nearest) -> Array:

@@ -17,7 +17,7 @@ import numpy as np
 from scara_ident.arrays import Array
 from scara_ident.estimation.information import Information
 from scara_ident.excitation.curves import Basis
-from scara_ident.excitation.promise import SURE, KnownBlocks, all_rows
+from scara_ident.excitation.promise import SURE_STANDARD_ERRORS, KnownBlocks, all_rows
 from scara_ident.excitation.search import UNSEEN
 from scara_ident.excitation.verification import grid
 from scara_ident.inquiry.answerability import Inquiry, known_rows
@@ -31,11 +31,11 @@ RATE, TURNING_RATE = 200.0, 500.0
 # Samples per second at a glance, and per period of the widest band: what turns faster than that is not within it.
 GLANCE_RATE, PER_PERIOD = 100.0, 5.0
 # Of what may be below the limit those that weigh less than this together are not looked at in a glance.
-LITTLE = 0.05
+GLANCE_SHARE = 0.05
 # Weights of kinds of questions against that of what may be below the limit: what was found comes first.
 WEIGHTS = {"confounders": 2.0, "unexplained": 2.0, "below_limit": 1.0, "parameter": 0.2}
 # How many times what is needed is worth having: noise and size are foreseen to a factor or two.
-ENOUGH = 5.0
+ENOUGH_RATIO = 5.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +92,7 @@ class Judge:
         order = np.argsort(-whole.weights, kind="stable")
         below = np.array([item.kind == "below_limit" for item in whole.inquiry.questions])[order]
         before = np.cumsum(np.where(below, whole.weights[order], 0.0)) - whole.weights[order]
-        kept = np.sort(order[~below | (before < (1.0 - LITTLE) * WEIGHTS["below_limit"])])
+        kept = np.sort(order[~below | (before < (1.0 - GLANCE_SHARE) * WEIGHTS["below_limit"])])
         if len(kept) == len(order):
             return whole
         fewer = replace(whole.inquiry, questions=tuple(whole.inquiry.questions[k] for k in kept))
@@ -114,8 +114,8 @@ class _Worth:
         sizes = np.array([sure.get(item.text, 0.0) if item.kind == "below_limit" else 0.0 for item in asked])
         rest = [item.kind != "below_limit" for item in asked]
         if any(rest):
-            sizes[rest] = self.inquiry.sigmas(rows.information, [*compress(asked, rest)]) / SURE
-        information = float(self.weights @ np.log((1.0 + sizes**2) / (1.0 + (sizes / ENOUGH) ** 2)))
+            sizes[rest] = self.inquiry.sigmas(rows.information, [*compress(asked, rest)]) / SURE_STANDARD_ERRORS
+        information = float(self.weights @ np.log((1.0 + sizes**2) / (1.0 + (sizes / ENOUGH_RATIO) ** 2)))
         return -information - (0.0 if all(rest) else WEIGHTS["below_limit"] * self._of_the_rest(rows.information))
 
     def _of_the_rest(self, rows: Information) -> float:

@@ -28,7 +28,7 @@ POSTURES = 4000
 # Share of the joints' limits that a motion uses, and distance that shapes keep, m.
 SHARE, CLEARANCE = 0.8, 0.01
 # A posture at rest must leave this share of every limit to move in.
-ROOM = 0.02
+ROOM_SHARE = 0.02
 # A joint of a smaller range, which is that of a lock, shows nothing.
 MIN_RANGE = {"rad": 1e-3, "m": 1e-5}
 
@@ -335,11 +335,11 @@ def resting_posture(
         random = np.random.default_rng(seed)
         drawn = random.uniform(limits.lower[:, None], limits.upper[:, None], (robot.n, POSTURES))
         tried = np.concatenate([limits.centre[:, None], drawn], axis=1)
-    if _at_rest(model, limits, nominal, tried[:, :1])[0][0] <= -ROOM:
+    if _at_rest(model, limits, nominal, tried[:, :1])[0][0] <= -ROOM_SHARE:
         return np.asarray(tried[:, 0])
     excess, broken = _at_rest(model, limits, nominal, tried)
     best = int(np.argmin(excess))
-    if excess[best] > -ROOM:
+    if excess[best] > -ROOM_SHARE:
         where = "at the start" if start is not None else "in every posture tried"
         raise InfeasibleLimits(f"limits cannot be kept {where}, even at rest: {broken(best)}")
     return np.asarray(tried[:, best])

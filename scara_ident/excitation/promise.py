@@ -23,7 +23,7 @@ from scara_ident.motion.rest import Bands
 # Samples per second of a motion whose promise is given.
 FINE_RATE = 1000.0
 # Standard errors at which an answer is sure enough.
-SURE = 5.0
+SURE_STANDARD_ERRORS = 5.0
 
 KnownBlocks = Callable[[Inquiry, Bands], Blocks | None]
 
@@ -81,7 +81,7 @@ class ExpectedAnswer:
     @property
     def settled(self) -> bool:
         """Whether the diagnosis is expected to be sure of the answer afterwards, whichever is true."""
-        return not self.hidden and (self.question.kind == "below_limit" or self.after >= SURE)
+        return not self.hidden and (self.question.kind == "below_limit" or self.after >= SURE_STANDARD_ERRORS)
 
     @property
     def words(self) -> str:

@@ -37,7 +37,7 @@ CORRECTION = Schedule(first=0.05, last=1e-2, tolerance=1e-2, steps=50, sharpness
 CHANGES = (0.03, 0.1, 0.2)
 ELITE = 3
 # Random starts have this share of the highest frequency as their bandwidth, and this share of the speed that a joint can have.
-SLOW, GENTLE = 0.25, 0.5
+START_BANDWIDTH_SHARE, START_SPEED_SHARE = 0.25, 0.5
 CORRECTIONS = 5
 # How much a motion shrinks that is beyond a limit, of the share beyond it; and at least and at most.
 SHRUNK, SHRINKING = 0.5, (0.95, 0.999)
@@ -176,12 +176,12 @@ def _random_motion(task: Task, random: np.random.Generator) -> Array:
     x = np.zeros(task.shape)
     for own, basis in zip(x, task.bases, strict=True):
         time = basis.duration * (np.arange(8 * basis.size) + 0.5) / (8 * basis.size)
-        top = max(3.0, SLOW * basis.bandwidth * basis.duration)
+        top = max(3.0, START_BANDWIDTH_SHARE * basis.bandwidth * basis.duration)
         orders = np.arange(1, int(np.ceil(top)) + 1)
         phases = 2.0 * np.pi / basis.duration * np.outer(orders, time)
         sizes = random.normal(size=(2, len(own), len(orders))) / np.sqrt(len(orders))
         velocity = sizes[0] @ np.cos(phases) + sizes[1] @ np.sin(phases)
-        velocity *= GENTLE * task.speed[:, None]
+        velocity *= START_SPEED_SHARE * task.speed[:, None]
         # The motion of the basis whose velocity is nearest to that.
         fit, *_ = np.linalg.lstsq(basis.rows(time, 1), velocity.T, rcond=1e-9)
         own[:, : basis.size] = fit.T

@@ -17,7 +17,7 @@ MANY_COEFFICIENTS, MAX_COEFFICIENTS = 160, 600
 # Samples per period of the highest harmonic that the criterion needs.
 MIN_PER_PERIOD = 4
 # A shorter motion has at least so many harmonics.
-FEWEST = 5
+MIN_HARMONICS = 5
 # They are told apart by a letter.
 MAX_TRAJECTORIES = 26
 
@@ -59,7 +59,7 @@ def durations_of(duration: float | Sequence[float], trajectories: int = 1) -> tu
 
 def harmonics_of(harmonics: int, share: float) -> int:
     """Return how many a motion of a share of the longest has: those up to the same frequency, and as many as rest needs."""
-    return max(min(harmonics, FEWEST), round(harmonics * share))
+    return max(min(harmonics, MIN_HARMONICS), round(harmonics * share))
 
 
 def check_size(chosen: int | Sequence[int], joints: int, trajectories: int, samples: int) -> None:

@@ -39,12 +39,12 @@ from scara_ident.threads import one_blas_thread
 # Motions that a search draws first, and changes of the best of them in a round.
 DRAWN, CHANGED = 48, 60
 # Speeds of a drawn motion as shares of the limits, evenly in their logarithm; how often a joint stands still.
-SLOWEST, STILL = 0.03, 0.15
+MIN_SPEED_SHARE, STANDSTILL_SHARE = 0.03, 0.15
 # Shares of the speeds that joints can have at which motions that tell most of the parameters are searched.
 PACES = (1.0, 0.3, 0.1)
 # Size of the first change, of 1 for another motion; it grows by this where a change helps and else shrinks by its fourth
 # root, so that one in five helps (Rechenberg 1973), and is at least so large.
-FIRST, GROWN, LEAST = 0.3, 1.5, 0.01
+FIRST_STEP, STEP_GROWTH, MIN_STEP = 0.3, 1.5, 0.01
 # What a motion that breaks a limit shrinks by at first, twice as much each time up to the most, and how often.
 SHRINKING, MAX_SHRINKING, TRIES = 0.01, 0.2, 40
 
@@ -150,9 +150,9 @@ class _Rounds:
         for _ in range(CHANGED):
             x = _inside(self.problem, _changed(task, best, size, self.beside, random))
             if x is not None and (now := self.judge.glance(x)) < least:
-                least, best, size = now, x, min(1.0, GROWN * size)
+                least, best, size = now, x, min(1.0, STEP_GROWTH * size)
             else:
-                size = max(LEAST, GROWN**-0.25 * size)
+                size = max(MIN_STEP, STEP_GROWTH**-0.25 * size)
         return _Climb(least, best, size)
 
     def _drawn(self, first: Sequence[Array], random: np.random.Generator) -> _Climb | None:
@@ -160,7 +160,7 @@ class _Rounds:
         wanted = (*first, *(random_motion(self.problem.task, random) for _ in range(DRAWN)))
         inside = [x for x in (_inside(self.problem, x) for x in wanted) if x is not None]
         looks = [self.judge.glance(x) for x in inside]
-        return _Climb(min(looks), inside[int(np.argmin(looks))], FIRST) if inside else None
+        return _Climb(min(looks), inside[int(np.argmin(looks))], FIRST_STEP) if inside else None
 
 
 def random_motion(task: Task, random: np.random.Generator) -> Array:
@@ -176,8 +176,8 @@ def random_motion(task: Task, random: np.random.Generator) -> Array:
         orders = np.arange(1, int(np.ceil(top)) + 1)
         phases = 2.0 * np.pi / basis.duration * np.outer(orders, time)
         size = random.normal(size=(2, len(orders))) / np.sqrt(len(orders))
-        if n < 2 or random.uniform() >= STILL:
-            share = np.exp(random.uniform(np.log(SLOWEST), 0.0))
+        if n < 2 or random.uniform() >= STANDSTILL_SHARE:
+            share = np.exp(random.uniform(np.log(MIN_SPEED_SHARE), 0.0))
             velocity[j] = share * task.speed[j] * (size[0] @ np.cos(phases) + size[1] @ np.sin(phases))
     x = velocity @ _inverse(basis, 1).T
     place = random.uniform(limits.lower, limits.upper)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.excitation.clearance import REACH
+from scara_ident.excitation.clearance import WATCHED_DISTANCE
 from scara_ident.excitation.curves import CHUNK, Basis
 from scara_ident.excitation.limits import Limits
 from scara_ident.excitation.problem import Problem, Task, row_names
@@ -148,7 +148,7 @@ def _of_distance(task: Task, x: Array, group: str, value: float, times: int) -> 
     for shares in np.array_split(np.linspace(0.0, 1.0, times), -(-times // CHUNK)):
         motion = Problem(task, rows_at(task.bases, shares), np.ones(0)).motion(x)
         least = min(least, clearance.smallest(motion.q, group))
-    share = value if value > 1.0 else max(0.0, 1.0 - (least - clearance.margin) / REACH)
+    share = value if value > 1.0 else max(0.0, 1.0 - (least - clearance.margin) / WATCHED_DISTANCE)
     return Reached(f"distance.{group}", clearance.margin, least, "m", share)
 
 

@@ -24,7 +24,7 @@ NO_PLACE = "the format has no place for it"
 AT_TIMES = "it was there at times; the arm is written as it is without it"
 NOT_READ = "programs that read it leave rotors out"
 # Torques of rigid bodies that differ by less, relative, are the same but for rounding.
-SAME = 1e-9
+ROUNDING_SHARE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -120,7 +120,7 @@ def said_by(form: Form, found: IdentifiedModel, standard: Array | None = None) -
     for term in set(absent) - set(held):
         value[absent[term]] = 0.0
     fitted, lower = _adjustable(form, found)
-    changed = np.abs(value - found.value) > SAME * np.max(np.abs(found.value), initial=0.0)
+    changed = np.abs(value - found.value) > ROUNDING_SHARE * np.max(np.abs(found.value), initial=0.0)
     negative = value[fitted] < lower
     refitted: tuple[str, ...] = ()
     if len(fitted) and (np.any(changed) or np.any(negative)):

@@ -22,7 +22,7 @@ RUN_KINDS = ("coulomb", "speed", "torque_scale", "offset", "delay")
 # What these make of friction as a whole and of torque scale, as a table has them beside each other.
 REPORTED_RUN_KINDS = np.array([[1, 0, 0, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]], dtype=float)
 # Friction of these powers of speed is also looked at alone; of higher ones a recording says little.
-ALONE = 2
+POWERS_ALONE = 2
 # What is left of a change of masses beside a body on the last link, as a share of it, up to which it is that body: no model is exact.
 # A mass of which as much shows in no row is not determined.
 LEFT_OF_PAYLOAD, UNDETERMINED = 0.1, 1e-6
@@ -104,7 +104,7 @@ def causes_of(
         power = 0
         for k in np.flatnonzero(own & np.isin(kinds, ("friction", "offset"))):
             column = model.columns[k]
-            alone = kinds[k] == "offset" or power < ALONE
+            alone = kinds[k] == "offset" or power < POWERS_ALONE
             power += kinds[k] == "friction"
             if alone:
                 determined = kinds[k] == "friction" and abs(value[k]) > SIGNIFICANT_STDS * std[k]

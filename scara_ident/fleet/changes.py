@@ -27,7 +27,7 @@ from scara_ident.fleet.history import (
 from scara_ident.fleet.scatter import LEFT_SHARE, Scatter, inverses_by_size
 
 # Chance that a report names any arm of a fleet in which nothing changed, and share of the arms named that are wrong on average.
-LEVEL = 0.02
+FALSE_CHANGE_LEVEL = 0.02
 # Causes named of one arm, and the probability up from which what one explains more than another is chance.
 MAX_CAUSES = 3
 AS_GOOD = 0.05
@@ -101,7 +101,7 @@ def find_changes(history: History, scatter: Scatter, tried: float) -> tuple[Chan
         unknown = _left_of_others(history, first, [item.beside for item in found])
         ordered = search.in_order(history.causes)
         trials = [trial for trial in ordered if np.any(_moved(history, first, trial) > unknown)]
-        if not trials or trials[0].p_value * tried >= LEVEL:
+        if not trials or trials[0].p_value * tried >= FALSE_CHANGE_LEVEL:
             break
         best, sizes = trials[0], history.causes[trials[0].cause].sizes
         enough = sizes * float(fdtri(sizes, scatter.freedom, 1.0 - AS_GOOD))
@@ -134,7 +134,7 @@ def _needed(found: Sequence[_Named], first: _Search, causes: Sequence[Cause], tr
         ]  # fmt: skip
         chances = [np.inf if trial is None else trial.p_value for trial in each]
         worst = int(np.argmax(chances))
-        if chances[worst] * tried < LEVEL:
+        if chances[worst] * tried < FALSE_CHANGE_LEVEL:
             return [replace(item, beside=trial) for item, trial in zip(left, each, strict=True) if trial is not None]
         del left[worst]
     return []
@@ -167,7 +167,7 @@ def arms_counted(probabilities: Sequence[float]) -> float:
     """
     count = len(probabilities)
     ranks = np.arange(1, count + 1)
-    named = np.flatnonzero(np.sort(probabilities) <= LEVEL * ranks / count)
+    named = np.flatnonzero(np.sort(probabilities) <= FALSE_CHANGE_LEVEL * ranks / count)
     return count / float(ranks[named[-1]] if len(named) else 1)
 
 
@@ -215,7 +215,7 @@ def grown_residuals(history: History, std: Array, freedom: float, tried: float) 
         spread = std[j] * np.sqrt(1.0 / ends + 1.0 / (count - ends))
         best = int(np.argmax(growth / spread))
         p_value = float(stdtr(freedom, -growth[best] / spread[best])) * tried
-        if p_value < LEVEL:
+        if p_value < FALSE_CHANGE_LEVEL:
             size, variance = np.array([np.expm1(growth[best])]), np.array([[spread[best] ** 2]])
             found.append(Change(None, joint, history.dates[ends[best]], False, size, variance, p_value))
     return tuple(found)

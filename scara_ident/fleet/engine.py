@@ -28,7 +28,7 @@ LOOK_SECONDS = 2.0
 MAX_DEATHS = 3
 CONNECT_SECONDS = "10s"
 # Variables that Dask gives processes beside those of its configuration.
-BESIDE = ("PYTHONHASHSEED", "__DASK_PARENT_PID")
+DASK_VARIABLES = ("PYTHONHASHSEED", "__DASK_PARENT_PID")
 # Bytes up to which a worker of this machine holds the memory of an array for the next one, and of all of them together.
 KEPT_ARRAY, KEPT_MEMORY = 32 << 20, 128 << 20
 
@@ -159,7 +159,7 @@ def started(scheduler: str | None = None, workers: int | None = None) -> Iterato
             count = workers or available_cores()
             with ExitStack() as stack:
                 spawned = dask.config.get("distributed.nanny.pre-spawn-environ")
-                stack.enter_context(_environment_kept((*spawned, *BESIDE)))
+                stack.enter_context(_environment_kept((*spawned, *DASK_VARIABLES)))
                 # Its processes, and those that stand in for them later, hear of no Ctrl-C: they are ended from here. Python's
                 # own process beside them is there before, as what starts it lets Ctrl-C through again.
                 resource_tracker.ensure_running()

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from scara_ident.fleet.changes import (
+    FALSE_CHANGE_LEVEL,
     FEWEST_STEPS,
-    LEVEL,
     Change,
     arms_counted,
     find_changes,
@@ -217,7 +217,7 @@ def changes_of(histories: Sequence[History]) -> dict[str, tuple[Change, ...]]:
         for item, probability in zip(compared, least, strict=True):
             own = tried[len(item.dates)]
             # Of most arms the surest change is none, and no more is asked.
-            named = find_changes(item, scatter, own * arms) if probability * arms < LEVEL else ()
+            named = find_changes(item, scatter, own * arms) if probability * arms < FALSE_CHANGE_LEVEL else ()
             found[item.arm] = named or grown_residuals(item, *residuals, own * len(compared))
         return found
 

@@ -23,11 +23,11 @@ from scara_ident.model.model import TorqueModel
 
 # Differences beyond so many of their standard deviations, as the median has it, are left out of their rms, and what share
 # of a normal variance is left.
-CUT, LEFT = 3.0, 0.9733
+TRIM_STDS, TRIMMED_VARIANCE = 3.0, 0.9733
 # What differences of neighbouring dates are worth beside independent values: each date is in two of them.
 EFFICIENCY = 0.6
 # Fewer variances say nothing of each other; degrees of freedom that are as good as infinite; steps to find fewer.
-FEWEST_VARIANCES, LARGE, NEWTON_STEPS = 5, 1e6, 20
+MIN_VARIANCES, LARGE_FREEDOM, NEWTON_STEPS = 5, 1e6, 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,8 +209,8 @@ def beyond_noise(steps: Array, noise: Array) -> Array:
         own, var = steps[known[:, k], k], noise[known[:, k], k]
         if len(own):
             size = median(np.abs(own)) / NORMAL_MEDIAN
-            kept = own[np.abs(own) <= CUT * size]
-            found[k] = 0.5 * float(np.mean(kept**2) / LEFT - median(var))
+            kept = own[np.abs(own) <= TRIM_STDS * size]
+            found[k] = 0.5 * float(np.mean(kept**2) / TRIMMED_VARIANCE - median(var))
     return found
 
 
@@ -235,11 +235,11 @@ def variance_prior(ratios: Array, freedom: float) -> tuple[float, float]:
     from scipy.special import polygamma, psi
 
     own = ratios[np.isfinite(ratios) & (ratios > 0.0)]
-    if len(own) < FEWEST_VARIANCES:
+    if len(own) < MIN_VARIANCES:
         return 0.0, 1.0
     logs = np.log(own) - psi(freedom / 2.0) + np.log(freedom / 2.0)
     excess = float(np.var(logs, ddof=1) - polygamma(1, freedom / 2.0))
-    if excess <= 1.0 / LARGE:
+    if excess <= 1.0 / LARGE_FREEDOM:
         return np.inf, float(np.exp(np.mean(logs)))
     half = 0.5 + 1.0 / excess
     for _ in range(NEWTON_STEPS):

@@ -17,7 +17,7 @@ _ANGLES = np.pi * np.arange(8) / 8.0
 _PAIRS = np.round([np.cos(_ANGLES), np.sin(_ANGLES)], 12)
 PARTS = np.hstack([np.eye(len(RUN_KINDS), 2) @ _PAIRS, np.eye(len(RUN_KINDS))[:, 2:]])
 # Rounds in which the variances settle, and the share of the largest within which they have.
-ROUNDS, SETTLED = 30, 1e-3
+ROUNDS, SETTLED_SHARE = 30, 1e-3
 
 
 def run_scatter(histories: Sequence[History]) -> tuple[Array, float]:
@@ -95,7 +95,7 @@ def joint_scatter(steps: Array, noise: Array) -> Array:
         reach = np.linalg.norm(design, axis=0)
         variances = nnls(design / reach, aim)[0] / reach
         total = base + 2.0 * (parts * variances) @ parts.T
-        if np.all(np.abs(variances - before) <= SETTLED * np.max(variances)):
+        if np.all(np.abs(variances - before) <= SETTLED_SHARE * np.max(variances)):
             break
     found[entering] = variances
     return found

@@ -9,8 +9,8 @@ import numpy as np
 
 from scara_ident.arrays import NORMAL_MEDIAN, Array
 from scara_ident.fleet.history import (
-    CUT,
-    LEFT,
+    TRIM_STDS,
+    TRIMMED_VARIANCE,
     History,
     common_removed,
     pseudo_inverses,
@@ -96,7 +96,7 @@ def fleet_scatter(histories: Sequence[History]) -> Scatter:
 
 def _mean_square(squares: Array) -> Array:
     usual = np.median(squares, axis=0) / NORMAL_MEDIAN**2
-    return np.asarray(np.nanmean(np.where(squares <= CUT**2 * usual, squares, np.nan), axis=0) / LEFT)
+    return np.asarray(np.nanmean(np.where(squares <= TRIM_STDS**2 * usual, squares, np.nan), axis=0) / TRIMMED_VARIANCE)
 
 
 def inverses_by_size(matrices: Array) -> Array:

@@ -19,13 +19,13 @@ BIN = 0.04
 BOUND = 5.0
 NORMAL = 1.4826
 # Nothing is said of a joint slower than this share of its peak speed, where friction is known least.
-SLOW = 0.03
+MIN_SPEED_SHARE = 0.03
 # The arm stands still where all joints are slower than this share, and for so long, s, before and after; longer than this, s.
-STILL, SETTLED, SHORTEST = 0.01, 0.06, 0.12
+STANDSTILL_SHARE, SETTLING_SECONDS, MIN_STANDSTILL = 0.01, 0.06, 0.12
 # Share of a window that has to be used, or nothing is said of it.
 FILLED = 0.6
 # Samples of a stretch that its standard deviation is taken from.
-ENOUGH = 5000
+SCALE_SAMPLES = 5000
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,15 +92,15 @@ class Binned:
         """
         shape = (*self.taken.shape, self.size)
         speed = np.abs(self.part.motion.v[:, : self.raw.shape[1]])
-        moving = np.any(speed > STILL * np.max(speed, axis=1, keepdims=True), axis=0)
-        wide = round(SETTLED * self.part.rate)
+        moving = np.any(speed > STANDSTILL_SHARE * np.max(speed, axis=1, keepdims=True), axis=0)
+        wide = round(SETTLING_SECONDS * self.part.rate)
         near = np.convolve(moving, np.ones(2 * wide + 1), mode="same") > 0.5
         rest = np.logical_not(np.any(near.reshape(shape[1:]), axis=1))
         torque = self.part.torque[:, : self.raw.shape[1]]
         predicted = _bin_means(torque - self.raw, self.size)
         recorded, found = _bin_means(torque, self.size), np.full(shape[:2], np.nan)
         for begin, end in runs_of(rest):
-            if (end - begin) * self.width > SHORTEST:
+            if (end - begin) * self.width > MIN_STANDSTILL:
                 inside = slice(begin, end)
                 found[:, inside] = recorded[:, inside] - np.median(predicted[:, inside], axis=1, keepdims=True)
         return found
@@ -128,7 +128,7 @@ class Binned:
 def bounded_noise(parts: Sequence[PreparedStretch], left: Sequence[Array], owner: Sequence[int]) -> dict[int, Array]:
     """Return for each recording the standard deviation of each joint's residual by its median, the larger of its and all's."""
     values = [
-        [row[use][:: max(1, len(row) // ENOUGH)] for row, use in zip(rows, part.used, strict=True)]
+        [row[use][:: max(1, len(row) // SCALE_SAMPLES)] for row, use in zip(rows, part.used, strict=True)]
         for rows, part in zip(left, parts, strict=True)
     ]
 
@@ -153,7 +153,7 @@ def binned(recording: int, part: PreparedStretch, left: Array, noise: Array) -> 
         used[:, : part.trim] = used[:, max(part.trim, part.samples - part.trim) :] = False
     motion, middle = part.motion, slice(size // 2, count * size, size)
     speed = np.abs(motion.v)
-    used = (used & (speed > SLOW * np.max(speed, axis=1, keepdims=True)))[:, : count * size]
+    used = (used & (speed > MIN_SPEED_SHARE * np.max(speed, axis=1, keepdims=True)))[:, : count * size]
     signals = (motion.q, motion.v, motion.a, part.torque - left)
     q, v, a, load = (row[:, middle] for row in signals)
     return Binned(recording, part, size, left[:, : count * size], used, noise, (q, v, a, load), np.zeros_like(q))

@@ -14,9 +14,9 @@ from scara_ident.estimation.observations import Observations, observe
 from scara_ident.estimation.urdf_gravity import urdf_gravity
 from scara_ident.estimation.urdf_scale import urdf_scale
 from scara_ident.identification.channel_comparison import (
-    ALIKE,
     POOR,
     ROUNDING,
+    SIMPLER_SHARE,
     far_less,
     few,
     friction_pushes,
@@ -144,7 +144,7 @@ def _best_reading(
         else:
             other = observed_as(held, turned(len(joints), signal, chosen[0]))
         then = held_out(other)
-        if mean(then[1]) >= ALIKE * least:
+        if mean(then[1]) >= SIMPLER_SHARE * least:
             continue
         # All other joints may be explained for all that.
         said = far_less(before, then, most, poor=signal == "effort" and not exchanged)

@@ -14,11 +14,11 @@ from scara_ident.identification.channel_fault import MENDED
 from scara_ident.model.terms.friction import Friction
 
 # A better reading is better block by block at this level of significance.
-LEVEL = 0.001
+SIGNIFICANCE_LEVEL = 0.001
 # Rows per parameter of each joint below which a fit comes near interpolation, whatever the channels are.
 ENOUGH_ROWS = 3.0
 # Of readings that count the simpler is taken where the other leaves more than this share of what it leaves.
-ALIKE = 0.8
+SIMPLER_SHARE = 0.8
 # Joints that are left less than this share of their torque are explained.
 POOR = 0.05
 # Pieces of each recording, one of which is held out in turns.
@@ -114,7 +114,7 @@ def better(left: Array, other: Array) -> bool:
     if len(mean) < 2:
         return False
     spread = float(np.std(mean, ddof=1)) / np.sqrt(len(mean))
-    return bool(np.mean(mean) + float(stdtrit(len(mean) - 1, 1.0 - LEVEL)) * spread < 0.0)
+    return bool(np.mean(mean) + float(stdtrit(len(mean) - 1, 1.0 - SIGNIFICANCE_LEVEL)) * spread < 0.0)
 
 
 def friction_pushes(value: Array, observations: Observations) -> NDArray[np.bool_]:

@@ -18,7 +18,7 @@ from scara_ident.model.terms import Friction, Offset
 from scara_ident.threads import side_by_side
 
 # A drift is said where chance makes one as large as rarely as it makes 5 standard deviations of many blocks of time, ...
-CHANCE = 5.7e-7
+DRIFT_LEVEL = 5.7e-7
 # ... and explains this share of what the model leaves: less moves no parameter by more than its uncertainty.
 SHARE = 2e-3
 # Powers of time by which friction and offset may change over a recording.
@@ -108,7 +108,7 @@ def _rate(joints: Sequence[_Sums], factor: Array, weight: Array, blocks: int) ->
     std = float(np.sqrt(np.sum(own**2))) / total
     if counted <= 2.0 or rate * np.sum(score) < SHARE * square:
         return None
-    return rate if 2.0 * stdtr(counted - 1.0, -abs(rate) / std) < CHANCE else None
+    return rate if 2.0 * stdtr(counted - 1.0, -abs(rate) / std) < DRIFT_LEVEL else None
 
 
 def _kept(observations: Observations, joint: int) -> int:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array, median, medians
-from scara_ident.identification.binned_residual import FILLED, NORMAL, STILL, Binned
+from scara_ident.identification.binned_residual import FILLED, NORMAL, STANDSTILL_SHARE, Binned
 
 # Standard deviations at which a sample is bounded where it is asked what other recordings have at the same state.
 LOOSE = 40.0
@@ -16,18 +16,18 @@ LOOSE = 40.0
 SLOWER = (0.03, 0.08, 0.2)
 # Functions of the state taken off at the most, the share of the squared residual that one removes at the least, what harm
 # counts against gain, and standard deviations beyond which a bin's weight falls.
-MAX_FEATURES, MIN_GAIN, HARM, INFLUENCE = 6, 0.02, 0.5, 10.0
+MAX_FEATURES, MIN_GAIN, HARM_WEIGHT, INFLUENCE_STDS = 6, 0.02, 0.5, 10.0
 # Share of a whole sum that is nothing but its rounding, where all of it is taken off again.
-NOTHING = 1e-9
+ROUNDING_SHARE = 1e-9
 # A trend is fitted to one of so many bins, of which there are so many for each of its columns, in so many rounds.
-THIN, MIN_BINS, ROUNDS = 2, 10, 7
+BIN_STRIDE, MIN_BINS, ROUNDS = 2, 10, 7
 # Numbers in the columns of the trends that are fitted together: more would leave the cache.
-TOGETHER = 2**15
+NUMBERS_AT_ONCE = 2**15
 # Starts of that fit, and standard deviations at which Tukey's loss gives up when it chooses among what they end in: half of all may
 # be off (Rousseeuw and Yohai 1984).
-STARTS, HALF = 12, 1.548
+ROBUST_STARTS, BREAKDOWN_CONSTANT = 12, 1.548
 # Fits that are nearer to each other than so many standard deviations of what they leave end in the same.
-ALIKE = 0.02
+SAME_FIT_STDS = 0.02
 # Seconds of a recording below which its trend is an offset alone.
 LONG_ENOUGH = 10.0
 # What depends on the state is determined by what is seen in other parts of about so long, s, than an event's own: hardly any event
@@ -48,7 +48,7 @@ def without_trends(stretches: Sequence[Binned]) -> list[Binned]:
     trends: dict[int, Array] = {}
     for places in of_shape.values():
         together = [np.concatenate(part) for part in zip(*(found[k] for k in places), strict=True)]
-        at_once = max(1, TOGETHER // together[0][0].size)
+        at_once = max(1, NUMBERS_AT_ONCE // together[0][0].size)
         starts = range(0, len(together[0]), at_once)
         parts = [_robust_trends(*(part[start : start + at_once] for part in together)) for start in starts]
         trends.update(zip(places, np.split(np.concatenate(parts), len(places)), strict=True))
@@ -75,10 +75,10 @@ def _columns_of_trend(own: Sequence[Binned]) -> tuple[Array, Array, NDArray[np.b
 def _robust_trends(whole: Array, left: Array, known: NDArray[np.bool_]) -> Array:
     """Return what columns (b, k, M) explain of residuals (b, M) by Tukey's weights of bins; nothing where there is too little."""
     trends, least = np.zeros_like(left), MIN_BINS * whole.shape[1]
-    enough = np.count_nonzero(known[:, ::THIN], axis=1) >= least
+    enough = np.count_nonzero(known[:, ::BIN_STRIDE], axis=1) >= least
     if not np.any(enough):
         return trends
-    together, target, use = (part[enough][..., ::THIN] for part in (whole, left, known))
+    together, target, use = (part[enough][..., ::BIN_STRIDE] for part in (whole, left, known))
     size = np.sqrt(np.mean(together**2, axis=2, keepdims=True))
     size = np.where(size > 0.0, size, 1.0)
     together, target = together / size * use[:, None], target * use
@@ -94,7 +94,7 @@ def _robust_trends(whole: Array, left: Array, known: NDArray[np.bool_]) -> Array
         scale = NORMAL * medians(np.abs(off) + beyond)
         exact = np.any(scale == 0.0, axis=1)
         # Where all end in the same the first stands for them, whatever others that are fitted beside do.
-        first |= np.ptp(value, axis=1).max(axis=1) < ALIKE * np.min(scale, axis=1)
+        first |= np.ptp(value, axis=1).max(axis=1) < SAME_FIT_STDS * np.min(scale, axis=1)
         if np.all(first):
             value, off, scale, weight = value[:, :1], off[:, :1], scale[:, :1], weight[:, :1]
         bounded = _tukey(off, 4.0 * np.where(exact[:, None], 1.0, scale)) ** 2
@@ -119,9 +119,9 @@ def _half_above(use: NDArray[np.bool_]) -> Array:
 
 
 def _but_one(count: int) -> Array:
-    """Return weights of so many bins that leave out one stretch each, of two neighbours' length, shape (`STARTS` - 1, count)."""
-    bounds = np.linspace(0, count, STARTS + 1).astype(int)
-    found = np.ones((STARTS - 1, count))
+    """Return weights of so many bins that leave out one stretch each, of two neighbours' length, shape (`ROBUST_STARTS` - 1, count)."""
+    bounds = np.linspace(0, count, ROBUST_STARTS + 1).astype(int)
+    found = np.ones((ROBUST_STARTS - 1, count))
     for row, begin, end in zip(found, bounds[:-2], bounds[2:], strict=True):
         row[begin:end] = 0.0
     return found
@@ -143,7 +143,7 @@ def _solved(products: Array, weight: Array) -> Array:
 def _least(off: Array, scale: Array) -> NDArray[np.intp]:
     """Return which of some residuals (b, s, M) Tukey's loss makes least, or squares where the scale (b,) is 0; shape (b,)."""
     exact = scale == 0.0
-    inside = np.sum(_tukey(off, HALF * np.where(exact, 1.0, scale)[:, None]) ** 3, axis=2)
+    inside = np.sum(_tukey(off, BREAKDOWN_CONSTANT * np.where(exact, 1.0, scale)[:, None]) ** 3, axis=2)
     return np.asarray(np.argmax(np.where(exact[:, None], -np.sum(off**2, axis=2), inside), axis=1))
 
 
@@ -187,15 +187,17 @@ def _of_others(
     lengths = np.diff(np.append(starts[firsts], len(left)))
     for _ in range(MAX_FEATURES):
         off = left - taken
-        most = INFLUENCE * NORMAL * median(np.abs(off[known]))
+        most = INFLUENCE_STDS * NORMAL * median(np.abs(off[known]))
         use = known * (most / np.maximum(np.abs(off), most or 1.0))
         weighted = columns * use
         scores, squares = (np.add.reduceat(weighted * more, starts, axis=1) for more in (off, columns))
         away = _not_near(squares)
-        value = _not_near(scores) / np.where(away > NOTHING * np.sum(squares, axis=1, keepdims=True), away, np.inf)
+        value = _not_near(scores) / np.where(
+            away > ROUNDING_SHARE * np.sum(squares, axis=1, keepdims=True), away, np.inf
+        )
         gains = np.add.reduceat(2.0 * value * scores - value**2 * squares, firsts, axis=1)
         # Where it does harm to one recording it is not that recording's doing.
-        gains[gains < 0.0] *= HARM
+        gains[gains < 0.0] *= HARM_WEIGHT
         best = int(np.argmax(np.sum(gains, axis=1)))
         if best in chosen or np.sum(gains[best]) < MIN_GAIN * np.sum(use * off**2):
             break
@@ -203,7 +205,7 @@ def _of_others(
         own = columns[chosen]
         normal = _not_near(np.add.reduceat(own[:, None] * (own * use), starts, axis=2))
         right = _not_near(np.add.reduceat(own * use * left, starts, axis=1))
-        least = NOTHING * float(np.sum(own * own * use)) + np.finfo(float).tiny
+        least = ROUNDING_SHARE * float(np.sum(own * own * use)) + np.finfo(float).tiny
         normal += (1e-6 * np.maximum(np.trace(normal), 0.0) + least) * np.eye(len(own))[:, :, None]
         values = np.linalg.solve(normal.transpose(2, 0, 1), right.T[:, :, None])[:, :, 0].T
         fitted = np.sum(np.repeat(values, counts, axis=1) * own, axis=0)
@@ -222,7 +224,7 @@ def _not_near(sums: Array) -> Array:
 
 def _turning(velocity: Array, most: Array | float) -> Array:
     """Return the sign of a speed that reaches so much, which is whole wherever anything is said of a joint."""
-    return np.tanh(velocity / (STILL * np.asarray(most)))
+    return np.tanh(velocity / (STANDSTILL_SHARE * np.asarray(most)))
 
 
 def _features(state: Sequence[Array], joint: int) -> Array:

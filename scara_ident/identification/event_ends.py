@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scara_ident.arrays import Array, runs_of
 
 # How far an event may reach to either side of what stands out most, s.
-REACH = 5.0
+REACH_SECONDS = 5.0
 # What comes so much later, s, is something else.
 GAP = 0.6
 # Its ends are looked for again between so long within and so long beyond them, s, in which something is seen.
@@ -26,7 +26,7 @@ LARGEST_STEP, LOOSE = 2.0, 4.0
 # What has under this share of the power that an event has at its strongest, after that, is what friction keeps of it or none of it.
 WEAK = 0.1
 # An end is stated to lie within the bins that hold so much of its likelihood, and one on either side, which it may cut.
-SURE = 0.95
+INTERVAL_LEVEL = 0.95
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ def event_ends(
     value = np.minimum(own**2, 4.0 * power[:, None])
     likelihood = np.sum(0.5 * (value * (1.0 - 1.0 / power[:, None]) - np.log(power[:, None])), axis=0)
     likelihood[~free] = -np.inf
-    middle, reach = (window.start + window.stop) // 2, int(REACH / width)
+    middle, reach = (window.start + window.stop) // 2, int(REACH_SECONDS / width)
     before = np.cumsum(likelihood[max(0, middle - reach) : middle + 1][::-1])
     after = np.cumsum(likelihood[middle : middle + reach])
     gap = round(GAP / width)
@@ -154,7 +154,9 @@ def _lasting(parts: Sequence[Array], length: int, near: int, far: int) -> tuple[
     # Between bins that say something the middle is as good as any.
     as_good = int(np.argmin(np.append(gain[best:] == gain[best], False)))
     likely = np.cumsum(np.exp(0.5 * (gain - gain[best])))
-    least, most = np.searchsorted(likely, np.array([0.5 - 0.5 * SURE, 0.5 + 0.5 * SURE]) * likely[-1]).tolist()
+    least, most = np.searchsorted(
+        likely, np.array([0.5 - 0.5 * INTERVAL_LEVEL, 0.5 + 0.5 * INTERVAL_LEVEL]) * likely[-1]
+    ).tolist()
     lasts = first + best + 1 + as_good // 2
     return lasts, min(first + least, lasts), max(first + most + 2, lasts)
 

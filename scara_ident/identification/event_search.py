@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array, median
 from scara_ident.estimation.tail import HOUR, Tail, tail_of
-from scara_ident.identification.binned_residual import BOUND, FILLED, NORMAL, STILL, Binned
+from scara_ident.identification.binned_residual import BOUND, FILLED, NORMAL, STANDSTILL_SHARE, Binned
 from scara_ident.identification.event_ends import GAP, Ends, event_ends
 
 # Lengths of the windows, s.
@@ -33,17 +33,17 @@ TOPS, TOPS_SHARE = 50, 0.1
 # a law that looks away from so many, some more may be of events; and for each of those the law is of some that are not.
 EVENT_SECONDS, EVENTS_SHARE, BESIDE_EVENTS, TOPS_PER_EVENT = 5, 0.15, 1.5, 3
 # Standard deviation of the tail's shape before anything is seen: what a model lacks makes it heavier than exponential.
-SHAPE = 0.1
+SHAPE_STD = 0.1
 # Least rms of an event in standard deviations of a bin, and the share of it that least squares leave too.
 MIN_SIZE, MIN_EVENT_SHARE = 2.0, 0.5
 # What lasts longer than this, s, and than this share of its recording is a change of the arm. What does not stand out surely is
 # seen for so long, s, before and after it within the other, and so is what is nearer to the ends of a recording than that: how
 # an arm starts and stops is no event.
-LONGEST, LONGEST_SHARE = 3.0, 0.15
-SEEN, BESIDE = 0.3, 1.0
+MAX_SECONDS, MAX_SHARE = 3.0, 0.15
+SEEN_SECONDS, END_SECONDS = 0.3, 1.0
 # Where speed, acceleration or torque are above this share of all, or all three farther from the next so many of other times than
 # they are in that share of all, only what stands out by so much is an event. At the most so many bins are compared with.
-USUAL, USUAL_TOGETHER, SURE, NEXT, COMPARED = 0.97, 0.95, 3.3, 5, 2000
+USUAL_SHARE, USUAL_JOINT_SHARE, UNUSUAL_STDS, NEIGHBOURS, MAX_COMPARED = 0.97, 0.95, 3.3, 5, 2000
 # Events are rare: a residual that stands out in more of the time than this is the model's doing.
 RARE = 0.2
 # A joint helps to find the ends of an event if it stands out by this share of what would make it one.
@@ -138,14 +138,14 @@ def _sizes(item: Binned, earlier: Sequence[Binned], segment: Segment) -> tuple[A
 def _local(segment: Segment) -> bool:
     """Whether it is short, and a joint that shows it is seen before and after it."""
     item = segment.binned
-    beside, seen = round(BESIDE / item.width), SEEN / item.width
+    beside, seen = round(END_SECONDS / item.width), SEEN_SECONDS / item.width
     # Rests do not count.
     moves = np.logical_not(np.isfinite(item.still[0]))
     shown = np.maximum(item.known, _slow(item))[segment.score >= 1.0]
     before = np.sum(shown[:, : segment.start][:, moves[: segment.start]][:, -beside:], axis=1)
     after = np.sum(shown[:, segment.stop :][:, moves[segment.stop :]][:, :beside], axis=1)
     inside = beside <= segment.start and segment.stop + beside <= item.left.shape[1]
-    sure = inside and float(np.max(segment.score)) >= SURE
+    sure = inside and float(np.max(segment.score)) >= UNUSUAL_STDS
     seen_beside = sure or bool(np.any((before >= seen) & (after >= seen)))
     return not _lasts(item, segment.ends) and seen_beside
 
@@ -153,7 +153,7 @@ def _local(segment: Segment) -> bool:
 def _lasts(item: Binned, ends: Ends) -> bool:
     """Whether it lasts too long for an event."""
     whole = item.left.shape[1] * item.width
-    return bool((ends.stop - ends.start) * item.width > max(LONGEST, LONGEST_SHARE * whole))
+    return bool((ends.stop - ends.start) * item.width > max(MAX_SECONDS, MAX_SHARE * whole))
 
 
 def _novel(segment: Segment, stretches: Sequence[Binned], shown: NDArray[np.bool_]) -> bool:
@@ -163,32 +163,33 @@ def _novel(segment: Segment, stretches: Sequence[Binned], shown: NDArray[np.bool
 
     def usual(j: int) -> bool:
         most = [
-            np.quantile(np.concatenate([np.abs(other.state[k][j]) for other in stretches]), USUAL) for k in (1, 2, 3)
+            np.quantile(np.concatenate([np.abs(other.state[k][j]) for other in stretches]), USUAL_SHARE)
+            for k in (1, 2, 3)
         ]
         beyond = [np.abs(item.state[k][j, inside]) > value for k, value in zip((1, 2, 3), most, strict=True)]
         own, often = _alone(segment, stretches, j)
-        beyond.append(own > np.quantile(often, USUAL_TOGETHER, method="higher"))
+        beyond.append(own > np.quantile(often, USUAL_JOINT_SHARE, method="higher"))
         return all(np.sum(power[j, there]) <= 0.5 * np.sum(power[j]) for there in beyond)
 
-    return not any(segment.score[j] >= SURE or usual(int(j)) for j in np.flatnonzero(shown))
+    return not any(segment.score[j] >= UNUSUAL_STDS or usual(int(j)) for j in np.flatnonzero(shown))
 
 
 def _part_of(segment: Segment, novel: Sequence[Segment]) -> bool:
     """Whether it is next to what is in states hardly ever seen: filters carry that beyond them. What is large stands by itself."""
     near = GAP / segment.binned.width
     gaps = (max(segment.start, item.start) - min(segment.stop, item.stop) for item in novel)
-    return bool(np.max(segment.score) < SURE) and any(gap <= near for gap in gaps)
+    return bool(np.max(segment.score) < UNUSUAL_STDS) and any(gap <= near for gap in gaps)
 
 
 def _alone(segment: Segment, stretches: Sequence[Binned], joint: int) -> tuple[Array, Array]:
     """Return how far a joint's states are from those next to them at other times: in each bin of a segment, and in all."""
-    thin = -(-sum(item.left.shape[1] for item in stretches) // COMPARED)
+    thin = -(-sum(item.left.shape[1] for item in stretches) // MAX_COMPARED)
     used = [np.flatnonzero(item.known[joint] > FILLED)[::thin] for item in stretches]
     place = [item is segment.binned for item in stretches].index(True)
 
     def states(k: int, bins: NDArray[np.intp]) -> Array:
         # Stretch and time tell what is another time.
-        time = bins * stretches[k].width / LONGEST
+        time = bins * stretches[k].width / MAX_SECONDS
         v, a, load = (row[joint, bins] for row in stretches[k].state[1:])
         # Friction turns with the speed: next to a slow motion is none the other way.
         return np.array([np.full(len(bins), k), time, v, np.sign(v), a, load])
@@ -201,7 +202,7 @@ def _alone(segment: Segment, stretches: Sequence[Binned], joint: int) -> tuple[A
         for row, other, size in zip(own[2:], among[2:], scale, strict=True):
             apart += ((row[:, None] - other) / size) ** 2
         apart[(own[0][:, None] == among[0]) & (np.abs(own[1][:, None] - among[1]) < 1.0)] = np.inf
-        least = min(NEXT, among.shape[1]) - 1
+        least = min(NEIGHBOURS, among.shape[1]) - 1
         return np.asarray(np.partition(apart, least, axis=1)[:, least])
 
     return distance(states(place, np.arange(segment.start, segment.stop))), distance(among)
@@ -267,7 +268,7 @@ def _tail(square: Array, events: int) -> Tail:
     events = max(EVENT_SECONDS, events)
     count = min(max(TOPS, TOPS_SHARE * len(square), TOPS_PER_EVENT * events), len(square) / 2)
     start = float(np.quantile(square, 1.0 - count / len(square)))
-    return tail_of(square, start, len(square), censored=min(events, int(count / 2)), prior=SHAPE)
+    return tail_of(square, start, len(square), censored=min(events, int(count / 2)), prior=SHAPE_STD)
 
 
 def _bin_noise(stretches: Sequence[Binned]) -> Array:
@@ -278,7 +279,7 @@ def _bin_noise(stretches: Sequence[Binned]) -> Array:
 def _slow(item: Binned) -> NDArray[np.bool_]:
     """Return where a joint turns slowly, but not so slowly that its friction may be of either sign, shape (n, M)."""
     speed = np.abs(item.state[1])
-    turns = speed > STILL * np.max(speed, axis=1, keepdims=True)
+    turns = speed > STANDSTILL_SHARE * np.max(speed, axis=1, keepdims=True)
     return np.asarray(turns & ~(item.known > FILLED))
 
 

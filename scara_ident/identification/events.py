@@ -36,7 +36,7 @@ NEAR_ENDS = 2.0
 # States at which the tool's Jacobian is taken.
 STATES = 40
 # Two lists hold the same event where their times overlap by this share.
-SAME = 0.5
+SAME_OVERLAP = 0.5
 # Events that are said in words: a long file may have hundreds.
 MAX_SENTENCES = 20
 # Another joint is named with an event if it stands out by this share of what would make it one.
@@ -265,7 +265,7 @@ def same_events(one: Sequence[Event], other: Sequence[Event]) -> bool:
             for item in events
             if item.recording == event.recording
         )
-        return max(both, default=0.0) >= SAME * (event.stop - event.start)
+        return max(both, default=0.0) >= SAME_OVERLAP * (event.stop - event.start)
 
     return all(held(event, other) for event in one) and all(held(event, one) for event in other)
 

@@ -25,7 +25,7 @@ ROUNDS = 3
 # Share of a column's square that keeps undetermined ones from growing.
 HELD = 1e-9
 # Share of a joint's torque that counts as none left.
-LEAST = 1e-6
+MIN_NOISE_SHARE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +103,7 @@ def _left(products: Array, along: Array, power: Array) -> Array:
     left[known] = 1.0
     for _ in range(ROUNDS):
         weight = np.zeros(len(power))
-        weight[known] = 1.0 / (power[known] * np.maximum(left[known], LEAST) ** 2)
+        weight[known] = 1.0 / (power[known] * np.maximum(left[known], MIN_NOISE_SHARE) ** 2)
         whole = np.tensordot(weight, products, 1)
         size = np.sqrt(np.diag(whole))
         scale = 1.0 / np.where(size > 0.0, size, 1.0)
@@ -112,7 +112,7 @@ def _left(products: Array, along: Array, power: Array) -> Array:
         value = scale * np.linalg.solve(scaled, scale * (weight @ along))
         by_value = products @ value
         squares = power - 2.0 * along @ value + by_value @ value
-        left[known] = np.sqrt(np.maximum(squares[known] / power[known], LEAST**2))
+        left[known] = np.sqrt(np.maximum(squares[known] / power[known], MIN_NOISE_SHARE**2))
     return left
 
 

@@ -14,13 +14,13 @@ from scara_ident.identification.few_rows import FewRows
 
 # Joints whose zeros are tried together, whatever each leaves alone; more only where the first of them leave less. Of arms with
 # many joints fewer, so that there are not more readings than this; nor all signs of their efforts.
-TOGETHER, MOST = 3, 1000
+MAX_JOINTS_TOGETHER, MAX_READINGS = 3, 1000
 # What may be of opposite sign on a joint.
 SIGNS = (JointReading(-1, 1), JointReading(1, -1), JointReading(-1, -1))
 # Readings that the search goes on from.
-KEPT = 5
+KEPT_READINGS = 5
 # What two readings leave differs by less than this share where they are one and the same.
-SAME = 1e-3
+SAME_ERROR_SHARE = 1e-3
 # What a reading is from the mapping: a number under an offset, a factor, or an axis of the URDF, which is two factors.
 ZERO_COST, FACTOR_COST, AXIS_COST = 2, 2, 3
 
@@ -47,7 +47,7 @@ def searched(rows: FewRows) -> dict[Reading, float]:
     changes = _telling(rows, tried)
     front = [start, *_signs(start), *_zeros(start, changes)]
     _try(rows, tried, front)
-    front, least = _distinct(tried, front)[:KEPT], np.inf
+    front, least = _distinct(tried, front)[:KEPT_READINGS], np.inf
     while tried[front[0]] < least:
         least = tried[front[0]]
         new = [
@@ -57,13 +57,13 @@ def searched(rows: FewRows) -> dict[Reading, float]:
             for own in (*every, JointReading())
         ]
         _try(rows, tried, new)
-        front = _distinct(tried, list(dict.fromkeys([*front, *new])))[:KEPT]
+        front = _distinct(tried, list(dict.fromkeys([*front, *new])))[:KEPT_READINGS]
     return tried
 
 
 def _signs(start: Reading) -> Iterator[Reading]:
     """Give all signs of efforts, which share their columns, and other signs of two joints."""
-    for effort in product((1, -1), repeat=len(start) if 2 ** len(start) <= MOST else 0):
+    for effort in product((1, -1), repeat=len(start) if 2 ** len(start) <= MAX_READINGS else 0):
         yield tuple(JointReading(sign) for sign in effort) or start
     for pair in combinations(range(len(start)), 2):
         for one, other in product(SIGNS, repeat=2):
@@ -73,7 +73,7 @@ def _signs(start: Reading) -> Iterator[Reading]:
 def _zeros(start: Reading, changes: Sequence[Sequence[JointReading]]) -> Iterator[Reading]:
     """Give the zeros of a few joints together."""
     every = [(j, own) for j, some in enumerate(changes) for own in some if own.signal is None]
-    together = [count for count in range(1, TOGETHER + 1) if comb(len(every), count) <= MOST]
+    together = [count for count in range(1, MAX_JOINTS_TOGETHER + 1) if comb(len(every), count) <= MAX_READINGS]
     for some in chain.from_iterable(combinations(every, count) for count in together):
         if len({j for j, _ in some}) == len(some):
             reading = start
@@ -107,7 +107,7 @@ def _distinct(tried: dict[Reading, float], readings: Sequence[Reading]) -> list[
     for reading in sorted(readings, key=tried.__getitem__):
         if tried[reading] > edge:
             found.append(reading)
-            edge = tried[reading] * (1.0 + SAME)
+            edge = tried[reading] * (1.0 + SAME_ERROR_SHARE)
         elif cost(reading) < cost(found[-1]):
             found[-1] = reading
     return found

@@ -15,7 +15,7 @@ from scara_ident.model.base_parameters import standard_regressor
 from scara_ident.motion.prepared import PreparedData
 
 # A recording is not explained where its error is this many times that of the fitted ones, and of the worst of these.
-WORSE, WORSE_THAN_ALL = 2.0, 1.5
+WORSE_RATIO, WORSE_THAN_WORST_RATIO = 2.0, 1.5
 # Another payload explains at least this share of its squared residual.
 PAYLOAD_FITS = 0.7
 # An error within so many of the standard deviations that the parameters, or what runs differ by, make is theirs: 95 %.
@@ -51,7 +51,7 @@ def held_out_events(value: Array, training: Observations, held_out: Observations
     found = []
     for item in rest.each:
         rms = np.array([rows.rms(value) for rows in item.joints])
-        least = np.maximum(WORSE * whole, WORSE_THAN_ALL * worst)
+        least = np.maximum(WORSE_RATIO * whole, WORSE_THAN_WORST_RATIO * worst)
         ratio = np.where(least > 0.0, rms / np.where(least > 0.0, least, 1.0), 0.0)
         if not np.any(ratio > 1.0):
             continue

@@ -12,12 +12,12 @@ from scara_ident.arrays import Array
 from scara_ident.estimation.least_squares import weighted_value
 from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.urdf_gravity import near_axis, urdf_gravity
-from scara_ident.identification.channel_comparison import ALIKE, far_less, friction_pushes, held_out, mean
+from scara_ident.identification.channel_comparison import SIMPLER_SHARE, far_less, friction_pushes, held_out, mean
 from scara_ident.identification.channel_fault import ChannelFault, faults_of, in_words
 from scara_ident.identification.channel_reading import JointReading, Reading, has_zeros, observed_as
 from scara_ident.identification.few_rows import FewRows
 from scara_ident.identification.gravity_check import SAME_GRAVITY, left_under, other_gravities
-from scara_ident.identification.reading_search import SAME, ZERO_COST, cost, searched
+from scara_ident.identification.reading_search import SAME_ERROR_SHARE, ZERO_COST, cost, searched
 
 # Readings that leave as much and are named; of more nothing is said.
 MAX_READINGS = 2
@@ -76,7 +76,7 @@ def wrong_zeros(
     if not has_zeros(chosen):
         return None
     # An arm that is mounted otherwise is as simple as one zero; to tell of that is not for the channels.
-    if _other_gravity(held, rows) * ALIKE <= tried[chosen]:
+    if _other_gravity(held, rows) * SIMPLER_SHARE <= tried[chosen]:
         return None
     found = _counted(held, before, pushing, most, rows, _common([chosen, *others])) if others else None
     if found is not None or len(others) > MAX_READINGS:
@@ -116,9 +116,9 @@ def _simplest(tried: dict[Reading, float]) -> tuple[Reading, list[Reading]]:
     def within(share: float, of: Reading) -> list[Reading]:
         return [reading for reading in order if tried[reading] * share <= tried[of]]
 
-    chosen = min(within(ALIKE, order[0]), key=cost)
-    others = [one for one in within(ALIKE, chosen) if one != chosen and cost(one) <= cost(chosen) + 1]
-    best = min(within(1.0 - SAME, order[0]), key=cost)
+    chosen = min(within(SIMPLER_SHARE, order[0]), key=cost)
+    others = [one for one in within(SIMPLER_SHARE, chosen) if one != chosen and cost(one) <= cost(chosen) + 1]
+    best = min(within(1.0 - SAME_ERROR_SHARE, order[0]), key=cost)
     if _common([best, chosen]) != chosen and cost(best) <= cost(chosen) + ZERO_COST:
         others.insert(0, best)
     return chosen, list(dict.fromkeys(others))

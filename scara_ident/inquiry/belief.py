@@ -32,7 +32,7 @@ from scara_ident.motion.rest import Bands
 # Directions of a few columns below this share of the largest are not known without a fold.
 _RANK = 1e-9
 # The largest effect that is too small to speak of is looked for to this share.
-NEAR = 0.01
+SIZE_TOLERANCE = 0.01
 # Blocks of time of one inquiry: more of longer recordings are taken together, which says no more than there is.
 MAX_BLOCKS = 200
 
@@ -217,7 +217,7 @@ def _times_negligible(scene: Scene, item: Suspect) -> float:
     small, large = 1e-12, 1e12
     if effect.negligible(scene, member, small * value) is None:
         return np.inf
-    while large > (1.0 + NEAR) * small:
+    while large > (1.0 + SIZE_TOLERANCE) * small:
         size = float(np.sqrt(small * large))
         small, large = (small, size) if effect.negligible(scene, member, size * value) is None else (size, large)
     return 1.0 / large

@@ -21,7 +21,7 @@ ASKED_SECONDS, ASKED_MOTION = 15.0, "excite --tell"
 # Kinds of questions whose motions come before recordings of another kind.
 URGENT = ("confounders", "unexplained")
 # Effects of which more could be said, and joints that are named of each.
-MOST, MAX_LABELS = 4, 3
+MAX_EFFECTS, MAX_LABELS = 4, 3
 # By diagnosis: its file, its report and its story in words all hold them, and they take all its recordings.
 _FOUND: WeakKeyDictionary[Diagnosis, tuple[NextStep, ...]] = WeakKeyDictionary()
 
@@ -169,9 +169,9 @@ def _faint(diagnosis: Diagnosis) -> Iterator[NextStep]:
             hidden.setdefault(name, []).append(decision)
         elif decision.gain > 0.0 and _significant(decision, diagnosis) and possible(decision, diagnosis):
             faint.setdefault(name, []).append(decision)
-    for members in list(faint.values())[:MOST]:
+    for members in list(faint.values())[:MAX_EFFECTS]:
         yield NextStep(f"to judge {with_reasons(members)}", settled_by(diagnosis.search, members[:MAX_LABELS]))
-    for members in list(hidden.values())[:MOST]:
+    for members in list(hidden.values())[:MAX_EFFECTS]:
         labels = listed([member.label for member in members], MAX_LABELS, " and ")
         said = f"to see {labels} at all, which these recordings cannot show"
         yield NextStep(said, members[0].candidate.effect.experiment)

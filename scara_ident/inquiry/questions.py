@@ -30,7 +30,7 @@ HALF_THE_SPEED = (
     "repeat one trajectory at half the speed; how the remainder scales tells friction from inertia and from delays"
 )
 # Parameters asked for, and the standard deviation over the size that makes one unsure.
-MAX_PARAMETERS, UNSURE = 3, 0.3
+MAX_PARAMETERS, UNSURE_SHARE = 3, 0.3
 
 
 @dataclass(frozen=True)
@@ -266,7 +266,7 @@ def _parameters(diagnosis: Diagnosis) -> Iterator[Question]:
     size = np.maximum(np.abs(after.value[: len(nominal)]), np.abs(nominal))
     share = np.divide(after.std[: len(size)], size, out=np.zeros(len(size)), where=nominal != 0.0)
     for k in np.argsort(-share)[:MAX_PARAMETERS]:
-        if share[k] > UNSURE:
+        if share[k] > UNSURE_SHARE:
             name = model.columns[k].name
             yield Question("parameter", f"value of {name}", parameter=name, size=float(size[k]),
                            experiment="record another motion over the whole workspace")  # fmt: skip

@@ -11,7 +11,7 @@ from itertools import product
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.inspection.values import ALIKE, averages, slopes, time_unit
+from scara_ident.inspection.values import MIN_CORRELATION, averages, slopes, time_unit
 from scara_ident.robot.units import ALSO, find_unit, is_unit, table_of
 
 QUANTITIES = {
@@ -327,6 +327,6 @@ def _are_slopes(numbers: Mapping[str, Array], time: str, positions: Sequence[str
     slope = slopes(numbers[time], np.array([numbers[name] for name in positions]))
     mean = averages(numbers[time], np.array([numbers[name] for name in velocities]))
     for known, recorded in zip(slope, mean, strict=True):
-        if np.std(known) > 0 and (np.std(recorded) == 0 or np.corrcoef(known, recorded)[0, 1] < ALIKE):
+        if np.std(known) > 0 and (np.std(recorded) == 0 or np.corrcoef(known, recorded)[0, 1] < MIN_CORRELATION):
             return False
     return True

@@ -8,22 +8,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
-from scara_ident.recording.audit.clock import FASTEST, SLOWEST, USUAL_INTERVAL
-from scara_ident.recording.audit.position import COUNTS, FAST, HIGH, LOW, SPEED_ROWS
+from scara_ident.recording.audit.clock import MAX_INTERVAL, MIN_INTERVAL, USUAL_INTERVAL
+from scara_ident.recording.audit.position import COUNTS, FAST_PERCENTILE, HIGH_PERCENTILE, LOW_PERCENTILE, SPEED_ROWS
 from scara_ident.robot.robot import Robot
 from scara_ident.robot.units import COUNT, TIME, TURN, table_of
 
 # A log of some samples a second is more usual than one of as many thousands: steps of 0.08 are s, not ms.
-SELDOM = 2e-4
+UNUSUAL_CLOCK_ODDS = 2e-4
 # Positions may lie beyond the limits by this share of the range, and move this many times faster than the limit.
 SLACK, HASTE = 0.1, 2.0
 # A joint of which nothing is known turns less than this either way, and not faster.
-WIDEST, FASTEST_JOINT = 2 * TURN, 4 * TURN
-LONGEST, FASTEST_SLIDE = 10.0, 10.0
+MAX_ANGLE, MAX_JOINT_SPEED = 2 * TURN, 4 * TURN
+MAX_SLIDE, MAX_SLIDE_SPEED = 10.0, 10.0
 # A recorded velocity is that of the position where it correlates so well with its slope, and fits within this share.
-ALIKE, NEAR = 0.9, 0.1
+MIN_CORRELATION, SLOPE_TOLERANCE = 0.9, 0.1
 # Of a clock that runs at another rate it is another multiple of the slope, alike on all joints within this share.
-SAME = 0.05
+CLOCK_TOLERANCE = 0.05
 # Of a joint this much slower than the fastest one slope and velocity are noise: of its encoder, while it stands still.
 SLOWER = 0.02
 
@@ -49,10 +49,14 @@ def time_unit(time: Array, said: str | None = None) -> str | None:
     if len(step) < 2 or not np.mean(step > 0) > 0.5 or np.mean(step < 0) > 0.01:
         return None
     median = float(np.median(step[step > 0]))
-    fitting = {name: unit.factor * median for name, unit in TIME.items() if FASTEST <= unit.factor * median <= SLOWEST}
+    fitting = {
+        name: unit.factor * median
+        for name, unit in TIME.items()
+        if MIN_INTERVAL <= unit.factor * median <= MAX_INTERVAL
+    }
     if said in fitting:
         return said
-    likely = {name: interval for name, interval in fitting.items() if interval > SELDOM} or fitting
+    likely = {name: interval for name, interval in fitting.items() if interval > UNUSUAL_CLOCK_ODDS} or fitting
     return min(likely, key=lambda name: abs(np.log(likely[name] / USUAL_INTERVAL))) if likely else None
 
 
@@ -101,7 +105,7 @@ def velocity_reading(slope: Array, velocity: Array, reduction: Array, *, linear:
     for side in ("joint", "motor"):
         gear = reduction[moving] if side == "motor" else np.ones(len(ratios))
         for name, unit in table_of("velocity", linear=linear and side == "joint").items():
-            if not name.startswith(COUNT) and np.all(np.abs(ratios * unit.factor / gear - 1) < NEAR):
+            if not name.startswith(COUNT) and np.all(np.abs(ratios * unit.factor / gear - 1) < SLOPE_TOLERANCE):
                 return Reading(name, side)
     return None
 
@@ -115,7 +119,7 @@ def one_multiple(slope: Array, velocity: Array) -> bool:
         As of `velocity_reading`.
     """
     ratios = _ratios(slope, velocity)
-    return ratios is not None and bool(np.all(np.abs(ratios / np.median(ratios) - 1.0) < SAME))
+    return ratios is not None and bool(np.all(np.abs(ratios / np.median(ratios) - 1.0) < CLOCK_TOLERANCE))
 
 
 def _ratios(slope: Array, velocity: Array) -> Array | None:
@@ -125,7 +129,7 @@ def _ratios(slope: Array, velocity: Array) -> Array | None:
         return None
     ratios = np.empty(int(moving.sum()))
     for k, (known, recorded) in enumerate(zip(slope[moving], velocity[moving], strict=True)):
-        if np.std(recorded) == 0 or abs(np.corrcoef(known, recorded)[0, 1]) < ALIKE:
+        if np.std(recorded) == 0 or abs(np.corrcoef(known, recorded)[0, 1]) < MIN_CORRELATION:
             return None
         ratios[k] = float(known @ recorded) / float(known @ known)
     return ratios
@@ -163,9 +167,9 @@ def _windows(time: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
 
 def _fit(robot: Robot, joints: list[int], time: Array, position: Array) -> bool:
     linear = bool(robot.prismatic[joints[0]])
-    low, high = np.percentile(position, (LOW, HIGH), axis=1)
+    low, high = np.percentile(position, (LOW_PERCENTILE, HIGH_PERCENTILE), axis=1)
     lower, upper = robot.lower[joints], robot.upper[joints]
-    widest = LONGEST if linear else WIDEST
+    widest = MAX_SLIDE if linear else MAX_ANGLE
     bounded = np.isfinite(upper - lower) & (upper > lower)
     lower, upper = np.where(bounded, lower, -widest), np.where(bounded, upper, widest)
     if bounded.any():
@@ -176,7 +180,7 @@ def _fit(robot: Robot, joints: list[int], time: Array, position: Array) -> bool:
         return False
     # An angle may be held within one turn.
     whole = position if linear else np.unwrap(position, axis=1)
-    speed = np.percentile(np.abs(slopes(time, whole)), FAST, axis=1)
+    speed = np.percentile(np.abs(slopes(time, whole)), FAST_PERCENTILE, axis=1)
     limit = robot.velocity_limit[joints]
-    fastest = FASTEST_SLIDE if linear else FASTEST_JOINT
+    fastest = MAX_SLIDE_SPEED if linear else MAX_JOINT_SPEED
     return bool(np.all(speed <= np.where(np.isfinite(limit), HASTE * limit, fastest)))

@@ -12,7 +12,7 @@ from scara_ident.arrays import Array
 # one size, the sums of an arm with axes at right angles and in parallel weigh them by 1 at most.
 HEAVIER = 10.0
 # Of those that weigh as much as the heaviest to this share, the first in the order leads.
-ALIKE = 0.99
+SAME_WEIGHT_SHARE = 0.99
 
 
 def sums_of(columns: Array, kept: Sequence[int], others: Sequence[int]) -> Array:
@@ -44,7 +44,7 @@ def with_heavier_leads(columns: Array, kept: Sequence[int], others: Sequence[int
         weights = np.abs(sums_of(columns, kept, others))
         if not np.max(weights) > HEAVIER:
             break
-        behind = int(np.argmax(np.max(weights, axis=0) > ALIKE * np.max(weights)))
+        behind = int(np.argmax(np.max(weights, axis=0) > SAME_WEIGHT_SHARE * np.max(weights)))
         before = int(np.argmax(weights[:, behind]))
         kept[before], others[behind] = others[behind], kept[before]
     return kept

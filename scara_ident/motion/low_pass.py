@@ -21,7 +21,7 @@ HIGHEST_CUT = 0.45
 # The filter's memory in periods of its cut-off: 4 of them leave under 1e-4 of a step.
 MEMORY_PERIODS = 4.0
 # A low-passed signal has nothing beyond this many times its cut-off, where the filter would leave 6e-8.
-HIGHEST = 8.0
+HIGHEST_RATIO = 8.0
 # Integral of its squared gain over frequency, in cut-offs: of 1 / (1 + x^8)^2 from 0 on.
 NOISE_WIDTH = 7.0 * np.pi / (64.0 * np.sin(np.pi / 8.0))
 # Of so many frequencies a mean over the filter's slope is that of all to a thousandth.
@@ -49,7 +49,7 @@ def low_pass(signal: Array, rate: float, cut: float | None, step: int = 1) -> Ar
     """
     if cut is None:
         return signal
-    return np.asarray(_filtered(signal, rate, cut, (0,), HIGHEST * cut, step)[0])
+    return np.asarray(_filtered(signal, rate, cut, (0,), HIGHEST_RATIO * cut, step)[0])
 
 
 def noise_share(rate: float, cut: float | None) -> float:
@@ -160,7 +160,7 @@ def _phases(count: int, ratio: float, step: int) -> _Phases:
     lead = -(-reach // step) * step
     closed = _closed_length(count, reach, step)
     low = closed // step
-    frequency = np.arange(min(closed // 2, int(HIGHEST * closed / ratio)) + 1) * (ratio / closed)
+    frequency = np.arange(min(closed // 2, int(HIGHEST_RATIO * closed / ratio)) + 1) * (ratio / closed)
     gain = np.asarray(1.0 / (step * (1.0 + frequency**8)), dtype=float)
     # Half the rate is its own mirror image.
     gain[2 * np.arange(len(frequency)) == closed] *= 0.5

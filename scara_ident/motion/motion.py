@@ -18,7 +18,7 @@ from scara_ident.motion.spline import cubic_spline
 from scara_ident.recording.audit.samples import GAP_STEPS
 from scara_ident.recording.long_file import cut_long
 from scara_ident.recording.recording import Recording
-from scara_ident.threads import LONG, THREADS, side_by_side, threads_for, works_alone
+from scara_ident.threads import LONG_ARRAY, THREADS, side_by_side, threads_for, works_alone
 
 # A time step that differs by less than this share from the median is not jitter.
 UNIFORM_TOLERANCE = 1e-3
@@ -154,7 +154,7 @@ class Stretch:
         """Low-pass positions of joints, each at its cut-off in Hz, those of one cut-off together."""
         missing = [item for item in cuts.items() if item not in self._filtered]
         groups = [[joint for joint, own in missing if own == cut] for cut in dict.fromkeys(cut for _, cut in missing)]
-        if self.position.shape[1] >= LONG and not works_alone():
+        if self.position.shape[1] >= LONG_ARRAY and not works_alone():
             # Of one recording alone its joints are what two threads share.
             groups = [group[k::THREADS] for group in groups for k in range(min(THREADS, len(group)))]
 

@@ -13,15 +13,15 @@ from scara_ident.motion.motion import Stretch
 # Aligned positions that differ by more than this share of their range are not the same motion.
 SAME_MOTION = 0.01
 # Less than this much of their range apart, on average, positions may be near each other because little time is between.
-NEAR = 0.1
+NEAR_SHARE = 0.1
 # A joint's range counts as at least this share of the widest joint's: one that stands still has only noise for a range.
 MIN_RANGE_SHARE = 0.01
 # Hz at which positions are laid on each other.
 FINE_RATE = 100.0
 # Share of its last period that a recording may lack.
-CUT = 0.02
+CUT_SHARE = 0.02
 # Distances in time that are looked at closely, the shortest first, and s about each of them.
-MAX_LAGS, BESIDE = 6, 0.4
+MAX_LAGS, WINDOW_SECONDS = 6, 0.4
 
 
 @dataclass(frozen=True)
@@ -58,10 +58,10 @@ def periods_of(stretch: Stretch) -> Periods | None:
         return None
     position /= np.sqrt(len(spread)) * np.maximum(spread, MIN_RANGE_SHARE * np.max(spread))[:, None]
     for near in _lags(position):
-        lag = _closest(position, near, round(BESIDE * rate))
+        lag = _closest(position, near, round(WINDOW_SECONDS * rate))
         first, stop = _longest(_apart(position, lag) < SAME_MOTION**2)
         # What repeats lasts a period longer than the times at which it does.
-        count = int((stop - first) / lag + 1.0 + CUT)
+        count = int((stop - first) / lag + 1.0 + CUT_SHARE)
         if count >= 2:
             starts = np.rint((first + lag * np.arange(count)) * stretch.rate / rate).astype(int)
             length = min(int(lag * stretch.rate / rate), len(stretch.time) - int(starts[-1]))
@@ -83,14 +83,14 @@ def at_rate(stretch: Stretch, rate: float) -> Array:
 def _lags(position: Array) -> list[int]:
     """Return by how many samples positions are moved where they lie near themselves, the fewest first."""
     distance = _distances(position)
-    away = np.flatnonzero(distance > NEAR**2)
+    away = np.flatnonzero(distance > NEAR_SHARE**2)
     if not len(away):
         return []
     inner = np.arange(max(1, away[0]), len(distance) - 1)
     before, own, after = distance[inner - 1], distance[inner], distance[inner + 1]
     lowest = inner[(own <= before) & (own < after) & (own < np.median(distance[away]))]
     # The way to the path and back moves the minimum, but most of the motion lies near itself there all the same.
-    return [int(lag) for lag in lowest if np.median(_apart(position, lag)) < NEAR**2][:MAX_LAGS]
+    return [int(lag) for lag in lowest if np.median(_apart(position, lag)) < NEAR_SHARE**2][:MAX_LAGS]
 
 
 def _closest(position: Array, lag: int, beside: int) -> float:

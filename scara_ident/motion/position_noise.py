@@ -17,12 +17,12 @@ from scara_ident.arrays import NORMAL_MEDIAN, Array, median
 from scara_ident.motion.low_pass import low_pass, removed_share
 from scara_ident.motion.motion import Stretch
 from scara_ident.motion.prepared import PreparedData, PreparedRecording, PreparedStretch
-from scara_ident.motion.rest import REST_NOISE, WIDE, stepping_speeds, velocity_noise
+from scara_ident.motion.rest import NOISE_CUT_RATIO, REST_NOISE, stepping_speeds, velocity_noise
 from scara_ident.threads import side_by_side
 
 # An interval longer than so many usual ones has lost samples; a clock is uneven, and its stamps rounded, from these shares of the
 # interval on, as `scara_ident.recording.audit` says so. Finer than this, s, stamps that count from 1970 hold rounding alone.
-LOST, JITTER, COARSE, FINEST = 1.5, 0.03, 0.02, 1e-6
+LOST_INTERVALS, JITTER_SHARE, COARSE_SHARE, FINEST_STAMP = 1.5, 0.03, 0.02, 1e-6
 # Of what rounded stamps would make this share at least is measured, or samples were taken at whole steps of time.
 BY_STAMPS = 0.25
 # Drawn by seed: fits, candidates and what is left all look at the same.
@@ -44,15 +44,15 @@ MIN_BLOCKS = 20
 # again. Whether it is the motion to less than a step matters not.
 STEPLESS = 0.02
 # Steps about two zeros that lie so much of a step apart are uncorrelated: ``1 - 6 x (1 - x)`` is zero.
-UNLIKE = 0.5 - np.sqrt(1.0 / 12.0)
+UNCORRELATED_SHIFT = 0.5 - np.sqrt(1.0 / 12.0)
 # Torque and acceleration beyond any band that are so much alike are one swing of the arm; noise of either is no part of
 # the other.
-ALIKE = 0.5
+SWING_CORRELATION = 0.5
 # A torque that swings acts on other joints as it is, times how much farther the masses that it swings lie from their axes than from
 # its own: the reach of an arm over that of its wrist. One that is less than theirs by more does not shake them.
 LEVER = 10.0
 # A joint that travels by a smaller share of what it can, or of a turn, hardly moves: further is better before finer.
-LITTLE = 0.1
+MIN_TRAVEL_SHARE = 0.1
 # Time over which a joint's speed is taken, s, in which the steps of its encoder hardly count.
 SPEED_OVER = 0.1
 
@@ -86,7 +86,7 @@ def coarse_positions(item: PreparedRecording, unit: Callable[[int], str]) -> str
             name, way = item.recording.joints[joint], float(np.ptp(position))
             found.append((name, step, part.bands[joint], way, unit(joint)))
     said = [
-        _too_coarse([each for each in found if (each[3] < LITTLE * 2.0 * np.pi) is little], little=little)
+        _too_coarse([each for each in found if (each[3] < MIN_TRAVEL_SHARE * 2.0 * np.pi) is little], little=little)
         for little in (True, False)
     ]
     return "; ".join(each for each in said if each) or None
@@ -157,9 +157,9 @@ def _shaken(data: PreparedData) -> dict[int, str]:
     for joint in np.flatnonzero(swings > changes):
         with_it = [_both_sides(np.diff(part.position[joint], 2), part.rate)[1] for part, _ in parts]
         both = sum(float(a @ b[1:-1]) for a, (_, b) in zip(with_it, sides[joint], strict=True))
-        if abs(both) <= ALIKE * np.sqrt(swings[joint] * sum(float(own @ own) for own in with_it)):
+        if abs(both) <= SWING_CORRELATION * np.sqrt(swings[joint] * sum(float(own @ own) for own in with_it)):
             continue
-        why = f"the torque of {names[joint]} swings more beyond {WIDE * parts[0][0].rate:.3g} Hz than it changes below"
+        why = f"the torque of {names[joint]} swings more beyond {NOISE_CUT_RATIO * parts[0][0].rate:.3g} Hz than it changes below"
         for other in np.flatnonzero(changes < LEVER**2 * swings[joint]):
             found.setdefault(int(other), why)
     return found
@@ -167,7 +167,7 @@ def _shaken(data: PreparedData) -> dict[int, str]:
 
 def _both_sides(signal: Array, rate: float) -> tuple[Array, Array]:
     """Return how a signal, shape (N,), changes within the widest band, and what is beyond it."""
-    within = low_pass(signal, rate, WIDE * rate)
+    within = low_pass(signal, rate, NOISE_CUT_RATIO * rate)
     return within - np.mean(within), signal - within
 
 
@@ -181,7 +181,7 @@ def noise_level(part: PreparedStretch, joint: int) -> float:
     return float(scatter / np.sqrt(max(nyquist - cut, 0.1 * nyquist) / nyquist))
 
 
-def _smooth(part: PreparedStretch, joint: int, widest: float = WIDE) -> tuple[Array, float]:
+def _smooth(part: PreparedStretch, joint: int, widest: float = NOISE_CUT_RATIO) -> tuple[Array, float]:
     """Return a filtered position, shape (N,), and the filter's frequency, at most this share of the rate."""
     cut, widest = part.cuts[joint], widest * part.stretch.rate
     if cut is not None and cut <= widest:
@@ -218,11 +218,11 @@ def stamp_rounding(time: Array) -> float:
     """
     interval = np.diff(time)
     usual = median(interval)
-    near = interval[interval < LOST * usual]
-    if not len(near) or float(np.std(near)) <= JITTER * usual:
+    near = interval[interval < LOST_INTERVALS * usual]
+    if not len(near) or float(np.std(near)) <= JITTER_SHARE * usual:
         return 0.0
-    rounded = FINEST * float(np.gcd.reduce(np.rint(interval / FINEST).astype(np.int64)))
-    return rounded if rounded > COARSE * usual else 0.0
+    rounded = FINEST_STAMP * float(np.gcd.reduce(np.rint(interval / FINEST_STAMP).astype(np.int64)))
+    return rounded if rounded > COARSE_SHARE * usual else 0.0
 
 
 def _beside_stamps(part: PreparedStretch, joint: int, level: float, late: float) -> float:
@@ -328,6 +328,8 @@ def _noisier(part: PreparedStretch, sizes: NoiseSizes, rng: np.random.Generator)
         if level > 0.0 or step is None:
             position[joint] += level * rng.standard_normal(position.shape[1])
         if step is not None:
-            smooth = _smooth(part, joint, STEPLESS)[0] + step * rng.choice((UNLIKE, 1.0 - UNLIKE))
+            smooth = _smooth(part, joint, STEPLESS)[0] + step * rng.choice(
+                (UNCORRELATED_SHIFT, 1.0 - UNCORRELATED_SHIFT)
+            )
             position[joint] += step * np.round(smooth / step) - smooth
     return replace(stretch, position=position, _filtered={}, _thinned={})

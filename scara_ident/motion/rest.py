@@ -30,7 +30,7 @@ FEW_SAMPLES = 20.0
 # Both sides of the equation fade out towards rest over this many periods of the position's low-pass.
 FADE_PERIODS = 1.0
 # The noise of an unfiltered joint is what a filter at this share of the rate takes out.
-WIDE = 0.2
+NOISE_CUT_RATIO = 0.2
 # Neither is longer than this, s: in a narrow band too little would be left between turning points. So the low-pass of a joint that stands
 # and breaks away has no longer period either, as far as the noise of positions leaves what counts as rest as it is.
 LONGEST_WIDENING = 0.05
@@ -108,7 +108,7 @@ def rest_speeds(stretch: Stretch, motion: Motion, bands: Bands) -> Array:
     least = REST_SHARE / REST_NOISE * np.max(np.abs(motion.v), axis=1)
     # Those that are not filtered pass a wide filter together.
     unfiltered = [j for j, cut in enumerate(motion.cuts) if cut is None]
-    stretch.filter_all(dict.fromkeys(unfiltered, WIDE * stretch.rate))
+    stretch.filter_all(dict.fromkeys(unfiltered, NOISE_CUT_RATIO * stretch.rate))
     noise = [velocity_noise(stretch, motion, j, bands[j], least[j]) for j in range(len(bands))]
     # While a joint rests its encoder is silent, and most of a recording may be rest: then that noise is too small.
     return np.maximum(REST_NOISE * np.array(noise), stepping_speeds(stretch, motion.cuts))
@@ -194,7 +194,7 @@ def velocity_noise(stretch: Stretch, motion: Motion, joint: int, band: float | N
     cut = reach = motion.cuts[joint]
     if cut is None or reach is None:
         # Nothing was filtered; the noise is what a wide filter would take out. Within a wide band all of it is there.
-        cut = WIDE * stretch.rate
+        cut = NOISE_CUT_RATIO * stretch.rate
         reach = cut if band is None else 0.5 * stretch.rate
         smooth = stretch.filtered(joint, cut)[0]
     else:

@@ -33,7 +33,7 @@ from scara_ident.motion.rest import POSITION_BAND, REST_WIDEN
 # Highest band as a share of the sample rate: the low-pass of positions must end below half the rate.
 HIGHEST_BAND = 0.1
 # Half the length of that low-pass in periods of the band: it leaves the band as it is to 1e-4.
-REACH = 0.95
+HALF_LENGTH_PERIODS = 0.95
 # Power of the cosine that is its window: with it the second derivative's weights end without a step.
 POWER = 6
 # Rows to either side that a pulse reaches over: successive ones are then correlated by 4e-4 at the most.
@@ -170,7 +170,7 @@ def row_filter(rate: float, band: float, block: int) -> RowFilter:
         row[k * step : k * step + len(one)] = one
     cut = POSITION_BAND * band
     widen = max(1, round(REST_WIDEN * rate / (cut * every)))
-    return RowFilter(rate, every, step, cut, derivatives(rate, cut, REACH / band), pulses, widen)
+    return RowFilter(rate, every, step, cut, derivatives(rate, cut, HALF_LENGTH_PERIODS / band), pulses, widen)
 
 
 def pulse(step: int) -> Array:

@@ -15,11 +15,11 @@ from scara_ident.online.filtered import RowFilter
 
 # Noise of positions that makes this share of what is left of rows is too much: as it grows with the square of frequency, it is then over
 # three times the torque's at the end of the band. With 0.37 there were 1.2 to 1.9 times the alarms asked for, with 0.44 3.5 times.
-MOST = 0.4
+MAX_NOISE_SHARE = 0.4
 # By so many standard deviations it is surely more.
-SURE = 2.0
+SIGNIFICANT_STDS = 2.0
 # In a band that does it is no more than the torque's even there, and so a fifth of it over the band.
-ENOUGH = 0.2
+SUFFICIENT_NOISE_SHARE = 0.2
 # In a row it grows as this power of the band. From this share on nothing of the rest is determined by what is left.
 GROWTH, NEARLY_ALL = 4.0, 0.95
 # Samples that the size of the noise is averaged over.
@@ -145,12 +145,17 @@ def too_wide(of_positions: Array, whole: Array, rows: Array, band: float, joints
     """
     share = of_positions / np.where(of_positions > 0.0, whole, 1.0)
     # A variance of N rows is known to the root of 2 / N of it.
-    outweighs = share > MOST * (1.0 + SURE * np.sqrt(2.0 / np.maximum(rows, 1.0)))
+    outweighs = share > MAX_NOISE_SHARE * (1.0 + SIGNIFICANT_STDS * np.sqrt(2.0 / np.maximum(rows, 1.0)))
     if not np.any(outweighs):
         return None
     # Where nearly all is noise of positions the difference does not tell the rest, of which what was given is all that is known.
     torque = np.where(share < NEARLY_ALL, whole - of_positions, np.minimum(1.0, (1.0 - NEARLY_ALL) * whole))
-    narrower = band * float(np.min((ENOUGH * torque / np.maximum(of_positions, ENOUGH * torque)) ** (1.0 / GROWTH)))
+    narrower = band * float(
+        np.min(
+            (SUFFICIENT_NOISE_SHARE * torque / np.maximum(of_positions, SUFFICIENT_NOISE_SHARE * torque))
+            ** (1.0 / GROWTH)
+        )
+    )
     each = ", ".join(
         f"{min(x, 1.0):.0%} on {joint}" for joint, x, sure in zip(joints, share, outweighs, strict=True) if sure
     )

@@ -25,8 +25,8 @@ MAX_SAMPLES = 60_000
 # (benchmarks/streaming.py), what a small machine has.
 LONGEST_WHOLE = 500_000
 # Samples that are read at once, and samples that are kept for what has to see samples side by side, in so many windows.
-PART = 4 * MAX_SAMPLES
-KEPT = 4 * MAX_SAMPLES
+PART_SAMPLES = 4 * MAX_SAMPLES
+KEPT_SAMPLES = 4 * MAX_SAMPLES
 WINDOWS = 8
 # Samples of the clock that are looked at together.
 CLOCK_ROWS = 1_000_000
@@ -53,7 +53,7 @@ class LongFile:
     @property
     def parts(self) -> tuple[tuple[int, ...], ...]:
         """Bounds of pieces that are read together, part by part: all of the file."""
-        return _together(self.bounds, PART)
+        return _together(self.bounds, PART_SAMPLES)
 
     @property
     def windows(self) -> tuple[tuple[int, ...], ...]:
@@ -61,15 +61,15 @@ class LongFile:
 
         Short pieces are kept together with their neighbours: alone they say little, or nothing.
         """
-        if self.samples <= KEPT:
+        if self.samples <= KEPT_SAMPLES:
             return (self.bounds,)
-        most = KEPT // WINDOWS
+        most = KEPT_SAMPLES // WINDOWS
         groups = _together(self.bounds, most)
         size = sum(min(group[-1] - group[0], most) for group in groups)
-        count = min(len(groups), max(WINDOWS, KEPT * len(groups) // size))
+        count = min(len(groups), max(WINDOWS, KEPT_SAMPLES * len(groups) // size))
         starts = [group[0] for group in groups]
         places = np.unique(np.searchsorted(starts, np.linspace(0, starts[-1], count).astype(int), side="right") - 1)
-        return tuple(_first_of(groups[k], KEPT // count) for k in places)
+        return tuple(_first_of(groups[k], KEPT_SAMPLES // count) for k in places)
 
 
 def long_file(path: Path, time: str, names: Sequence[str]) -> LongFile | None:

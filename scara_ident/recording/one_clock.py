@@ -14,7 +14,7 @@ from scara_ident.recording.audit.clock import MIN_SAMPLES
 from scara_ident.recording.audit.samples import GAP_STEPS
 
 # Channels whose rows are the same but for this share were sampled together, and what lacks in one of them is a fault.
-TOGETHER = 0.5
+SAME_ROWS_SHARE = 0.5
 
 
 def on_one_clock(
@@ -108,7 +108,7 @@ def _groups(here: Mapping[str, NDArray[np.bool_]]) -> list[list[str]]:
 
 
 def _together(rows: NDArray[np.bool_], other: NDArray[np.bool_]) -> bool:
-    return bool(np.count_nonzero(rows & other) >= TOGETHER * max(1, min(rows.sum(), other.sum())))
+    return bool(np.count_nonzero(rows & other) >= SAME_ROWS_SHARE * max(1, min(rows.sum(), other.sum())))
 
 
 def _at(time: Array, stamps: Array, values: Array) -> tuple[Array, bool, NDArray[np.bool_]]:

@@ -17,11 +17,11 @@ Sketch = tuple[Hashes, NDArray[np.intp]]
 # Samples in a row that are compared as one. Two runs of one motion on coarse channels may agree in a sample or two.
 WINDOW = 32
 # At least this share of them differs from the sample before: at rest everything agrees.
-MOVING = 0.5
+MOVING_SHARE = 0.5
 # Of all windows of the recordings compared with, those with the smallest hashes are kept, so many; 16 bytes each.
-KEPT = 65536
+KEPT_WINDOWS = 65536
 # A copy of this share of a recording is no accident, if it is at least so many windows.
-MIN_SHARE, FEWEST = 0.02, 3
+MIN_SHARE, MIN_WINDOWS = 0.02, 3
 # Samples at a time.
 CHUNK = 65536
 # Of single samples of one joint one in 2 to the power of this is looked at to tell whether recordings may share any samples.
@@ -104,7 +104,7 @@ def _with_windows(sketch: Sketch, recording: Recording, place: int) -> Sketch:
         values = np.concatenate([values, hashes])
         owners = np.concatenate([owners, np.full(len(hashes), place, dtype=np.intp)])
         values, first = np.unique(values, return_index=True)
-        values, owners = values[:KEPT], owners[first][:KEPT]
+        values, owners = values[:KEPT_WINDOWS], owners[first][:KEPT_WINDOWS]
     return values, owners
 
 
@@ -114,7 +114,7 @@ def _max_shared(sketch: Sketch, other: Recording, known: Sequence[Recording]) ->
     if not len(values):
         return None
     # Below this bound every window of the known recordings is among those kept.
-    bound = values[-1] if len(values) == KEPT else np.iinfo(np.uint64).max
+    bound = values[-1] if len(values) == KEPT_WINDOWS else np.iinfo(np.uint64).max
     seen, hits = 0, np.zeros(len(known), dtype=np.intp)
     for hashes in _windows(other):
         asked = hashes[hashes <= bound]
@@ -123,7 +123,7 @@ def _max_shared(sketch: Sketch, other: Recording, known: Sequence[Recording]) ->
         seen += len(asked)
         hits += np.bincount(owners[places[same]], minlength=len(known))
     total = int(hits.sum())
-    if total < FEWEST or total < MIN_SHARE * seen:
+    if total < MIN_WINDOWS or total < MIN_SHARE * seen:
         return None
     return known[int(np.argmax(hits))], total / seen
 
@@ -141,7 +141,7 @@ def _windows(recording: Recording) -> Iterator[Hashes]:
             # Two halves, of which the first is mixed so that their order counts.
             hashes = _mixed(hashes[:-size]) + hashes[size:]
             size *= 2
-        yield _mixed(hashes)[moved[WINDOW:] - moved[:-WINDOW] >= MOVING * WINDOW]
+        yield _mixed(hashes)[moved[WINDOW:] - moved[:-WINDOW] >= MOVING_SHARE * WINDOW]
 
 
 def _samples(signals: Sequence[Array]) -> Hashes:

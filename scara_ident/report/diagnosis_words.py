@@ -22,11 +22,11 @@ from scara_ident.report.identification import bias_said
 from scara_ident.robot.rotors import GUESS_FACTOR
 
 # An uncertainty below this factor is written as a standard deviation.
-NEAR = 1.3
+NEAR_FACTOR = 1.3
 # Two values differ from so many of their common standard deviations: 0.3 %.
 DIFFERENT_STDS = 3.0
 # An error is said to be worse from so many times on: less may be chance.
-WORSE = 1.2
+WORSE_RATIO = 1.2
 
 
 def sentences(diagnosis: Diagnosis) -> tuple[str, ...]:
@@ -109,7 +109,7 @@ def _errors(diagnosis: Diagnosis) -> list[str]:
     units = {joint: diagnosis.robot.torque_unit(j) for j, joint in enumerate(diagnosis.robot.joints)}
     changes = [f"{joint} {a:.3g} to {b:.3g} {units[joint]}" for joint, a, b in errors]
     found = [f"Rms error on the {kind} recordings: {'; '.join(changes)}."]
-    worse = [f"{joint} ({b / a:.2g} times)" for joint, a, b in errors if b > WORSE * a > 0.0]
+    worse = [f"{joint} ({b / a:.2g} times)" for joint, a, b in errors if b > WORSE_RATIO * a > 0.0]
     if worse:
         instead = "there use the model without it, or fit further motions"
         found.append(f"Worse with what was found than without: {', '.join(worse)}; {instead}.")
@@ -227,7 +227,7 @@ def _of_rotor(rotor: RotorInertia, diagnosis: Diagnosis) -> str:
     if rotor.determined and rotor.factor is not None:
         near = f"{rotor.armature:.3g} ± {rotor.armature * np.log(rotor.factor):.1g} {unit}"
         far = f"{rotor.armature:.2g} {unit} within a factor of {rotor.factor:.2g}"
-        found = near if rotor.factor < NEAR else far
+        found = near if rotor.factor < NEAR_FACTOR else far
         return f"The rotor inertia of {rotor.joint} is not stated: {guess}, and found to be {found}."
     return (
         f"The rotor inertia of {rotor.joint} is not stated and hardly shows: {guess}, which may err by a factor of "

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 # What is fed forward does harm where it leaves so many times the error that is left without, and more of that of the PID alone
 # than a draw of the arm changes, and than is written: in whole per cent the two would be one number.
-HARM, HARM_OF_PID = 1.1, 0.01
+HARM_RATIO, HARM_SHARE_OF_PID = 1.1, 0.01
 # What is fed forward, in words.
 WORDS = {
     "pid": "PID alone",
@@ -101,7 +101,7 @@ def _cost_said(item: EffectWorth, rms: Mapping[str, Array]) -> str:
 
 def _harms(fed: float, without: float) -> bool:
     """Tell whether errors with and without what is fed forward, in shares of that of the PID alone, speak against it."""
-    return fed > HARM * without and fed - without > HARM_OF_PID
+    return fed > HARM_RATIO * without and fed - without > HARM_SHARE_OF_PID
 
 
 def total(errors: Array, alone: Array) -> float:

@@ -23,9 +23,9 @@ from scara_ident.files import path_fault, real_path
 from scara_ident.robot.examples import example_urdf, is_name
 
 # Sizes that a factor of a drive or a channel may have.
-SMALLEST, LARGEST_FACTOR = 1e-12, 1e12
+MIN_FACTOR, MAX_FACTOR = 1e-12, 1e12
 # Characters of a robot.yaml, and nodes of it with its aliases written out.
-LARGEST = 1_000_000
+MAX_CHARACTERS = 1_000_000
 # What the key urdf takes.
 URDF = "the path of a URDF, or the name of a robot of example-robot-data"
 
@@ -33,8 +33,8 @@ URDF = "the path of a URDF, or the name of a robot of example-robot-data"
 def _not_zero(value: float) -> float:
     if value == 0.0:
         raise ValueError("expected a number other than 0")
-    if not SMALLEST <= abs(value) <= LARGEST_FACTOR:
-        raise ValueError(f"expected a size between {SMALLEST:g} and {LARGEST_FACTOR:g}")
+    if not MIN_FACTOR <= abs(value) <= MAX_FACTOR:
+        raise ValueError(f"expected a size between {MIN_FACTOR:g} and {MAX_FACTOR:g}")
     return value
 
 
@@ -116,7 +116,7 @@ class JointDescription(BaseModel):
 
     reduction: NonZero | None = None
     effort_gain: NonZero = 1.0
-    rotor_inertia: Annotated[Finite, Field(ge=0.0, le=LARGEST_FACTOR)] | None = None
+    rotor_inertia: Annotated[Finite, Field(ge=0.0, le=MAX_FACTOR)] | None = None
     acceleration_limit: Annotated[Finite, Field(gt=0.0)] | None = None
     jerk_limit: Annotated[Finite, Field(gt=0.0)] | None = None
 
@@ -224,11 +224,13 @@ def read_description(path: Path) -> RobotDescription:
         raise RobotError(fault)
     try:
         with path.open(encoding="utf-8") as file:
-            text = file.read(LARGEST + 1)
-        if len(text) > LARGEST:
-            raise RobotError(f"{path}: more than {LARGEST} characters; a robot.yaml has a few lines for each joint")
+            text = file.read(MAX_CHARACTERS + 1)
+        if len(text) > MAX_CHARACTERS:
+            raise RobotError(
+                f"{path}: more than {MAX_CHARACTERS} characters; a robot.yaml has a few lines for each joint"
+            )
         tree = yaml.compose(text, Loader=yaml.SafeLoader)
-        if _size(tree, {}) > LARGEST:
+        if _size(tree, {}) > MAX_CHARACTERS:
             raise RobotError(f"{path}: aliases (*name) of aliases, which unfold without end; write the values out")
         _refuse_twice(tree, path)
         content: Any = yaml.load(text, Loader=Loader)

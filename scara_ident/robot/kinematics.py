@@ -12,7 +12,7 @@ from scara_ident.errors import RobotError
 from scara_ident.robot.robot import Robot
 
 # Directions of a force below this share of the best determined one are not felt, and an axis is determined with this share of it in others.
-UNFELT, DETERMINED = 1e-3, 0.999
+UNFELT_SHARE, DETERMINED_SHARE = 1e-3, 0.999
 
 
 def place_of(robot: Robot, joint_id: int) -> int:
@@ -93,7 +93,7 @@ def tool_placement(robot: Robot) -> tuple[Array, Array]:
 def constant_force(rows: Sequence[Array] | Array, torques: Sequence[Array] | Array) -> tuple[Array, float]:
     """Return the force, N, shape (3,), of which rows (n, 3) make torques (n,) best, and the share of their square that it explains."""
     matrix, right = np.concatenate(rows), np.concatenate(torques)
-    force = np.asarray(np.linalg.lstsq(matrix, right, rcond=UNFELT)[0])
+    force = np.asarray(np.linalg.lstsq(matrix, right, rcond=UNFELT_SHARE)[0])
     total = float(right @ right)
     return force, 1.0 - float(np.sum((right - matrix @ force) ** 2)) / total if total > 0.0 else 0.0
 
@@ -107,16 +107,16 @@ def force_covariance(rows: Sequence[Array] | Array, products: Array) -> Array:
         Mean products of errors of the torques, which are the same for all rows.
     """
     matrix = np.concatenate(rows)
-    inverse = np.linalg.pinv(matrix, rcond=UNFELT)
+    inverse = np.linalg.pinv(matrix, rcond=UNFELT_SHARE)
     slope = inverse @ np.tile(np.eye(len(products)), (len(rows), 1))
-    undetermined = np.diag(inverse @ matrix) < DETERMINED
+    undetermined = np.diag(inverse @ matrix) < DETERMINED_SHARE
     return np.asarray(np.where(undetermined[:, None] | undetermined, np.nan, slope @ products @ slope.T))
 
 
 def felt_directions(robot: Robot, configurations: Iterable[Array]) -> int:
     """Return how many directions of a force on the tool the arm feels in one configuration or another."""
     singular = np.linalg.svd(np.concatenate(list(force_torques(robot, configurations))), compute_uv=False)
-    return int(np.sum(singular > UNFELT * singular[0]))
+    return int(np.sum(singular > UNFELT_SHARE * singular[0]))
 
 
 def weakest_direction(rows: Sequence[Array] | Array, directions: int) -> float:

@@ -10,7 +10,7 @@ from scara_ident.simulation.plant import Plant
 from scara_ident.simulation.spatial import rotate, rotate_back
 
 # Times closer than this are the same, s.
-SAME = 1e-9
+SAME_TIME = 1e-9
 # Way over which the dry friction of a shaft grows to 1 - 1/e of its size, rad (m): short beside any motion.
 SHAFT_WAY = 1e-4
 
@@ -23,7 +23,7 @@ def carry(plant: Plant, t: float, bodies: Array) -> None:
         for j in range(10):
             bodies[i, j] = plant.bodies[i, j]
     for k in range(plant.payload_span.shape[0]):
-        if plant.payload_span[k, 0] <= t + SAME < plant.payload_span[k, 1]:
+        if plant.payload_span[k, 0] <= t + SAME_TIME < plant.payload_span[k, 1]:
             for j in range(10):
                 bodies[n - 1, j] += plant.payload_body[k, j]
 
@@ -33,7 +33,7 @@ def until_change(plant: Plant, t: float, left: float) -> float:
     """Return how long, at most ``left``, the arm carries what it does at ``t``."""
     for k in range(plant.payload_span.shape[0]):
         for edge in plant.payload_span[k]:
-            if SAME < edge - t < left - SAME:
+            if SAME_TIME < edge - t < left - SAME_TIME:
                 left = edge - t
     return left
 

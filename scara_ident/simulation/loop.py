@@ -8,7 +8,7 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.simulation.compiled import at_hand, compiled
-from scara_ident.simulation.external import SAME, until_change
+from scara_ident.simulation.external import SAME_TIME, until_change
 from scara_ident.simulation.forces import Room, State, make_room
 from scara_ident.simulation.integrate import Stages, first_stage, make_stages, make_state, step
 from scara_ident.simulation.plant import Plant, Sensors
@@ -144,7 +144,7 @@ def _track(
                 part = until_change(plant, now, left)
                 events += step(plant, room, x, s, now, part, drive)
                 left -= part
-                if left <= SAME * h:
+                if left <= SAME_TIME * h:
                     break
                 now += part
                 first_stage(plant, room, x, s, now, drive)

@@ -18,7 +18,7 @@ from scara_ident.simulation.reference import ReferenceMotion
 # A pose whose smallest singular value is this share of the largest is taken for singular.
 SINGULAR = 5e-3
 # The tool point is found to this share of the arm's reach.
-CLOSE = 1e-9
+POINT_TOLERANCE = 1e-9
 # Poses along the path that are solved for; between them joint positions are a spline of degree 7.
 POSES = 401
 NEWTON_STEPS = 60
@@ -227,7 +227,7 @@ def follow(
         q, distance, quality = _solve(tool, point, orientation, q)
         if quality < SINGULAR and not _leads_out(tool, curve(min(share + AHEAD, 1.0)), orientation, q):
             raise PathError(f"{name}: singular at {_where(share, point)}; choose a path away from it", share, point)
-        if quality < SINGULAR or distance > CLOSE * tool.reach:
+        if quality < SINGULAR or distance > POINT_TOLERANCE * tool.reach:
             raise PathError(f"{name}: {_where(share, point)} is outside the reach; move the path closer", share, point)
         _check_range(robot, q, share, point, name)
         poses[k] = q
@@ -260,11 +260,11 @@ def _first_pose(tool: Tool, point: Array, near: Array, name: str) -> Array:
         guess = near if attempt == 0 else near + random.uniform(-1.0, 1.0, len(near)) * min(0.1 * attempt, 1.5)
         q, distance, quality = _solve(tool, point, orientation, guess)
         best = min(best, distance)
-        if distance <= CLOSE * tool.reach and quality >= SINGULAR and _inside(tool.robot, q):
+        if distance <= POINT_TOLERANCE * tool.reach and quality >= SINGULAR and _inside(tool.robot, q):
             return q
-        if attempt == 0 and distance <= CLOSE * tool.reach and quality < SINGULAR:
+        if attempt == 0 and distance <= POINT_TOLERANCE * tool.reach and quality < SINGULAR:
             raise PathError(f"{name}: singular at {_where(0.0, point)}; choose a path away from it", 0.0, point)
-    if best <= CLOSE * tool.reach:
+    if best <= POINT_TOLERANCE * tool.reach:
         raise PathError(f"{name}: no pose within the joints' ranges at {_where(0.0, point)}; move it", 0.0, point)
     raise PathError(f"{name}: {_where(0.0, point)} is outside the reach; move the path closer", 0.0, point)
 
@@ -281,7 +281,7 @@ def _solve(tool: Tool, point: Array, orientation: Array | None, q: Array) -> tup
         u, sizes, vt = np.linalg.svd(jacobian, full_matrices=False)
         quality = float(sizes[tool.rank - 1] / sizes[0])
         distance = float(np.linalg.norm(error))
-        if distance <= CLOSE * tool.reach:
+        if distance <= POINT_TOLERANCE * tool.reach:
             break
         used = sizes[: tool.rank]
         damping = (1e-2 * sizes[0]) ** 2 if quality < 2e-2 else 0.0

@@ -15,7 +15,7 @@ from scara_ident.recording.files.parquet_csv import column_names, read_columns
 from scara_ident.robot.robot import Robot
 
 # Positions, velocities and accelerations in SI units beyond this are no motion of an arm.
-LARGEST = 1e9
+MAX_MAGNITUDE = 1e9
 # Samples that a simulated run may have: most of three hours at 1 kHz.
 MAX_SAMPLES = 10_000_000
 
@@ -38,7 +38,7 @@ class ReferenceMotion:
     Raises
     ------
     RecordingError
-        If shapes disagree, a value is not finite or beyond `LARGEST`, or time does not grow.
+        If shapes disagree, a value is not finite or beyond `MAX_MAGNITUDE`, or time does not grow.
     """
 
     name: str
@@ -56,7 +56,7 @@ class ReferenceMotion:
                 raise RecordingError(f"{self.name}: {name} has shape {values.shape}; joints and time ask for {shape}")
             if not np.all(np.abs(values) < HUGE):
                 raise RecordingError(f"{self.name}: {name} has a value that is not finite; give a complete motion")
-            if np.any(np.abs(values) > LARGEST):
+            if np.any(np.abs(values) > MAX_MAGNITUDE):
                 raise RecordingError(
                     f"{self.name}: {name} reaches {np.max(np.abs(values)):.3g}, which no arm does; give it in rad, m and s"
                 )

@@ -13,13 +13,13 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError
-from scara_ident.estimation.tail import CLUSTERS_OVER_RATE, MIN_CLUSTERS, TOGETHER, Tail, fit_tail
+from scara_ident.estimation.tail import CLUSTER_SECONDS, CLUSTERS_OVER_RATE, MIN_CLUSTERS, Tail, fit_tail
 from scara_ident.use.external_torque import Observed
 
 # Groups of recordings left out to see how sure the rate is.
 FOLDS = 5
 # Share of its samples that brings every joint's residual to one scale.
-COMMON = 0.995
+COMMON_QUANTILE = 0.995
 # Largest spread of the rate that is allowed for: more is a guess.
 MAX_SPREAD = 1.5
 # Least share of the mean size of a joint's peaks that their size is taken for in any state.
@@ -85,7 +85,7 @@ def calibrate(runs: Sequence[Observed], rate: float) -> Alarm:
     scale, floor = residual_scale(runs)
     # Joints are brought to one scale: none makes most alarms.
     each = [np.abs(run.torque[:, run.settled]) / sized(scale, floor, run.features[:, :, run.settled]) for run in runs]
-    common = np.quantile(np.concatenate(each, axis=1), COMMON, axis=1)
+    common = np.quantile(np.concatenate(each, axis=1), COMMON_QUANTILE, axis=1)
     scores = [np.max(z / common[:, None], axis=0) for z in each]
     times = [run.time[run.settled] for run in runs]
     tail = fit_tail(times, scores, float(np.sum(seconds)), rate)
@@ -143,7 +143,7 @@ def sized(scale: Array, floor: Array, features: Array) -> Array:
 def residual_scale(runs: Sequence[Observed]) -> tuple[Array, Array]:
     """Return what the peaks of the residual are made of, shape (n, k), and the least of their size, shape (n,).
 
-    The largest absolute value in each `TOGETHER` is fitted by the features' means with coefficients that are not negative.
+    The largest absolute value in each `CLUSTER_SECONDS` is fitted by the features' means with coefficients that are not negative.
     Peaks and not the mean, since a joint at rest has nearly the same residual all the time, and one that moves has not.
     """
     largest, _, features = in_windows(runs)
@@ -169,7 +169,7 @@ def in_windows(runs: Sequence[Observed]) -> tuple[Array, Array, Array]:
         if len(places) == 0:
             continue
         torque = run.torque[:, places]
-        window = np.floor(run.time[places] / TOGETHER)
+        window = np.floor(run.time[places] / CLUSTER_SECONDS)
         starts = np.r_[0, np.flatnonzero(np.diff(window)) + 1]
         count = np.diff(np.r_[starts, len(places)])
         largest = np.maximum.reduceat(np.abs(torque), starts, axis=1)

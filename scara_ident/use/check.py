@@ -24,9 +24,9 @@ from scara_ident.use.joint_limits import JointLimits, Margin, margins
 
 # A margin below so many standard deviations of the foreseen torque is close; a peak is unsure where they are above this
 # share of it.
-CLOSE, UNSURE = 2.0, 0.1
+CLOSE_STDS, UNSURE_SHARE = 2.0, 0.1
 # Slowest share of the speed that is tried, and how finely the largest that can be run is found.
-SLOWEST, STEPS = 0.02, 14
+MIN_SPEED_SHARE, BISECTIONS = 0.02, 14
 # Limits or joints in a sentence, at the most.
 MAX_NAMED = 6
 # Samples at which slower motions are looked at.
@@ -202,10 +202,10 @@ def _speed_share(known: IdentifiedModel, limits: JointLimits, drives: Sequence[D
         slower = [drive(known, slowed(motion, share)) for motion in motions]
         return all(each.kept for each in margins(known.robot, limits, slower))
 
-    low, high = SLOWEST, 1.0
+    low, high = MIN_SPEED_SHARE, 1.0
     if not runs(low):
         return None
-    for _ in range(STEPS):
+    for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if runs(middle) else (low, middle)
     return low
@@ -283,9 +283,9 @@ def sentences(found: Check) -> list[str]:
             f"Within two standard deviations of the foreseen torque of the limit: {', '.join(each.name for each in close)}."
         )
     unsure = [
-        f"{each.joint} ({each.torque:.3g} ± {CLOSE * each.std:.2g} {each.unit})"
+        f"{each.joint} ({each.torque:.3g} ± {CLOSE_STDS * each.std:.2g} {each.unit})"
         for each in found.peaks
-        if CLOSE * each.std > UNSURE * abs(each.torque)
+        if CLOSE_STDS * each.std > UNSURE_SHARE * abs(each.torque)
     ]
     if unsure:
         said.append(
@@ -300,7 +300,7 @@ def sentences(found: Check) -> list[str]:
 
 def _close(found: Check) -> list[Margin]:
     std = {each.joint: each.std for each in found.peaks}
-    return [each for each in found.margins if each.kind == "torque" and abs(each.margin) < CLOSE * std[each.joint]]
+    return [each for each in found.margins if each.kind == "torque" and abs(each.margin) < CLOSE_STDS * std[each.joint]]
 
 
 def _named(each: Margin) -> str:

@@ -14,7 +14,7 @@ from scara_ident.recording.recording import Recording
 from scara_ident.robot.kinematics import place_of
 from scara_ident.robot.robot import Robot
 from scara_ident.use.contact_force import MIN_JOINTS, ContactForce, contact_force
-from scara_ident.use.contact_samples import STRONG
+from scara_ident.use.contact_samples import PEAK_SHARE
 from scara_ident.use.external_torque import FEATURES, Observed
 from scara_ident.use.observer import ContactObserver
 
@@ -120,7 +120,7 @@ def _contact(observer: ContactObserver, observed: Observed, threshold: Array, sh
     robot = observer.known.robot
     inside = np.arange(span.start, span.stop)
     size = np.max(share[:, span], axis=0)
-    strong = inside[size >= STRONG * float(np.max(size))]
+    strong = inside[size >= PEAK_SHARE * float(np.max(size))]
     # Means, so that no peak of the noise names a joint.
     mean = np.mean(observed.torque[:, strong], axis=1)
     most = np.abs(mean) / np.mean(threshold[:, strong], axis=1)

@@ -8,7 +8,7 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.robot.kinematics import (
-    UNFELT,
+    UNFELT_SHARE,
     constant_force,
     force_covariance,
     place_of,
@@ -33,7 +33,7 @@ LOADED = 4.0
 # Standard deviation of where on the last link something touches it, about the tool, along each axis, m: a flange, a hand or a gripper.
 ABOUT_TOOL = 0.1
 # Newton's steps to force and point, and their size relative to the force and to `ABOUT_TOOL` at which they end.
-STEPS, ENOUGH = 30, 1e-6
+MAX_STEPS, STEP_TOLERANCE = 30, 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +122,7 @@ def _leaves_noise(row: Array, torque: Array, unsure: Array) -> bool:
     from scipy.special import chdtrc
 
     half = np.linalg.inv(np.linalg.cholesky(unsure))
-    force, _, rank, _ = np.linalg.lstsq(half @ row, half @ torque, rcond=UNFELT)
+    force, _, rank, _ = np.linalg.lstsq(half @ row, half @ torque, rcond=UNFELT_SHARE)
     freedom = len(torque) - int(rank)
     return freedom == 0 or float(chdtrc(freedom, np.sum((half @ (torque - row @ force)) ** 2))) >= REFUSED
 
@@ -164,14 +164,17 @@ def _beside_tool(fitted: ContactSamples, unsure: Array, force: Array, point: Arr
     rows, torques = np.einsum("ij,kjab->kiab", half, fitted.rows), fitted.torques @ half.T
     prior = np.hstack([np.zeros((3, 3)), np.eye(3) / ABOUT_TOOL])
     point, ended = np.zeros(3) if point is None else point, False
-    for _ in range(STEPS):
+    for _ in range(MAX_STEPS):
         by_force = rows[..., 0] + rows[..., 1:] @ point
         by_point = np.einsum("kiab,a->kib", rows[..., 1:], force)
         slope = np.concatenate([np.concatenate([by_force, by_point], axis=2).reshape(-1, 6), prior])
         left = np.concatenate([(torques - by_force @ force).ravel(), -point / ABOUT_TOOL])
         step = np.linalg.lstsq(slope, left, rcond=None)[0]
         force, point = force + step[:3], point + step[3:]
-        if np.linalg.norm(step[:3]) < ENOUGH * np.linalg.norm(force) and np.linalg.norm(step[3:]) < ENOUGH * ABOUT_TOOL:
+        if (
+            np.linalg.norm(step[:3]) < STEP_TOLERANCE * np.linalg.norm(force)
+            and np.linalg.norm(step[3:]) < STEP_TOLERANCE * ABOUT_TOOL
+        ):
             ended = True
             break
     # Of all joints' torques and the point's three numbers, six are used up.

@@ -13,7 +13,7 @@ from scara_ident.use.external_torque import Observed
 from scara_ident.use.observer import ContactObserver
 
 # States of a contact at which the Jacobian is taken, and the share of its peak from which on a first force is fitted.
-STATES, STRONG = 80, 0.5
+STATES, PEAK_SHARE = 80, 0.5
 # A contact's force is whole from the first to the last sample that shows so much of the first one: less is its begin or its end.
 WHOLE = 0.9
 # Fits of that first force, the second without what the first takes for its end.
@@ -56,7 +56,7 @@ def contact_samples(
     ----------
     threshold : ndarray, shape (n, N)
     inside, strong : ndarray of int
-        Samples of the contact, and those in which its torque is at least `STRONG` of the largest.
+        Samples of the contact, and those in which its torque is at least `PEAK_SHARE` of the largest.
     """
     places = inside[:: max(1, len(inside) // STATES)]
     gain, time = 2.0 * np.pi * observer.settings.bandwidth, observed.time[places]

@@ -12,8 +12,8 @@ from scara_ident.simulation.reference import ReferenceMotion
 
 # Shares of the limits; half of the way that a joint without limits goes, rad or m.
 RANGE_SHARE, SPEED_SHARE, EFFORT_SHARE = 0.6, 0.6, 0.7
-REACH = 1.5
-SPEED, SLIDE_SPEED = 2.0, 0.4
+FREE_RANGE = 1.5
+FREE_SPEED, FREE_SLIDE_SPEED = 2.0, 0.4
 # Peak speed of the quintic in lengths of the way per duration.
 QUINTIC_PEAK = 1.875
 POSES, PAUSE = 5, 0.2
@@ -37,12 +37,12 @@ def trial_motion(arm: VirtualArm, seed: int = 0, *, poses: int = POSES) -> Refer
     robot, random = arm.robot, np.random.default_rng(seed)
     # A range from 0 to 0, as drawing programs write it where none was set, is none: the arm was identified by its motion.
     stated = robot.upper > robot.lower
-    lower = np.where(stated & np.isfinite(robot.lower), robot.lower, -REACH)
-    upper = np.where(stated & np.isfinite(robot.upper), robot.upper, REACH)
-    middle, half = 0.5 * (lower + upper), np.minimum(0.5 * RANGE_SHARE * (upper - lower), REACH)
+    lower = np.where(stated & np.isfinite(robot.lower), robot.lower, -FREE_RANGE)
+    upper = np.where(stated & np.isfinite(robot.upper), robot.upper, FREE_RANGE)
+    middle, half = 0.5 * (lower + upper), np.minimum(0.5 * RANGE_SHARE * (upper - lower), FREE_RANGE)
     places = middle[:, None] + half[:, None] * random.uniform(-1.0, 1.0, (robot.n, poses))
     places = np.concatenate([places, places[:, :1]], axis=1)
-    usual = np.where(robot.prismatic, SLIDE_SPEED, SPEED)
+    usual = np.where(robot.prismatic, FREE_SLIDE_SPEED, FREE_SPEED)
     speed = SPEED_SHARE * np.minimum(robot.velocity_limit, usual)
     limit = EFFORT_SHARE * robot.torque_limit
     for slower in SLOWER ** np.arange(ATTEMPTS):

@@ -19,7 +19,7 @@ from scara_ident.use.trial_motion import trial_motion
 from scara_ident.use.use import use
 
 # Poses of the motion, and effects that are looked at one by one, so that it takes seconds.
-POSES, MOST = 2, 4
+POSES, MAX_EFFECTS = 2, 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +96,7 @@ def worth(model: IdentifiedModel, *, seed: int = 0) -> Worth:
             not_fed = less.rms
         return EffectWorth(entry, alone.rms, not_fed)
 
-    each = tuple(side_by_side(of_one, range(min(len(pairs), MOST))))
+    each = tuple(side_by_side(of_one, range(min(len(pairs), MAX_EFFECTS))))
     return Worth(model, found.motion, found.rms(), each, missing, found.notes)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from scara_ident.excitation import Effort, InfeasibleLimits, design_excitation, excitation_dict, limits_of
-from scara_ident.excitation.clearance import REACH
+from scara_ident.excitation.clearance import WATCHED_DISTANCE
 from scara_ident.excitation.verification import Reached
 from scara_ident.excitation.watched_pairs import clearance_of
 from scara_ident.model.model import build_model
@@ -52,7 +52,7 @@ def test_a_box_over_the_floor(tmp_path):
     # Rows are 1 at the margin, and 0 where there is room.
     near = clearance.nearest(q, clearance.reach)
     np.testing.assert_allclose(
-        clearance.rows(near, 40), [np.clip(1.0 - (lowest + 1.3 - 0.02) / REACH, 0.0, None)], atol=1e-7
+        clearance.rows(near, 40), [np.clip(1.0 - (lowest + 1.3 - 0.02) / WATCHED_DISTANCE, 0.0, None)], atol=1e-7
     )
 
 
@@ -87,7 +87,7 @@ def test_pairs_count_together_and_smoothly(tmp_path):
     q = np.array([lift, 0.1 * np.sin(40.0 * lift) - lift, 0.1 * np.cos(26.0 * lift)])
     heights = np.array([middle(q, 1)[1], middle(q, 2)[1]]) + 0.3 - 0.05
     near = clearance.nearest(q, clearance.reach)
-    row, room = clearance.rows(near, 2001)[0], (heights - 0.02) / REACH
+    row, room = clearance.rows(near, 2001)[0], (heights - 0.02) / WATCHED_DISTANCE
     free = room.min(axis=0) > 0.0
     swaps = np.flatnonzero(np.diff(np.sign(room[0] - room[1])) * free[1:])
     assert np.any(room[:, swaps] < 1.0) and np.any(~free) and np.any(room.min(axis=0) > 1.0)

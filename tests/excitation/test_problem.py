@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from scara_ident.excitation import ExcitationTrajectory, information_of
-from scara_ident.excitation.clearance import REACH, TOLERANCE
+from scara_ident.excitation.clearance import TOLERANCE, WATCHED_DISTANCE
 from scara_ident.excitation.limits import limits_of
 from scara_ident.excitation.problem import row_names
 from scara_ident.excitation.search import _random_motion
@@ -38,7 +38,7 @@ def test_gradient_and_slopes_are_those_of_differences(name):
         # Coal finds a distance to its tolerance, of which the rows have 1 / REACH, and the weights add up to less than 2.
         distances = np.array([name.startswith("distance") for name, _ in row_names(problem.task.limits, x.shape[1])])
         np.testing.assert_allclose(pushed[~distances], change[~distances], atol=1e-7 * np.abs(pushed).max())
-        np.testing.assert_allclose(pushed[distances], change[distances], atol=2.0 * TOLERANCE / REACH)
+        np.testing.assert_allclose(pushed[distances], change[distances], atol=2.0 * TOLERANCE / WATCHED_DISTANCE)
 
 
 def test_no_motion_is_faster_than_its_range_and_its_frequencies_leave_it():

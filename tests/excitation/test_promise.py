@@ -12,7 +12,7 @@ from scara_ident.effects import Member
 from scara_ident.effects.periodic import PERIODS_COVERED, TorqueRipple
 from scara_ident.estimation.information import merge
 from scara_ident.estimation.observations import observe
-from scara_ident.excitation.promise import SURE, expected_answers, rows_in_blocks
+from scara_ident.excitation.promise import SURE_STANDARD_ERRORS, expected_answers, rows_in_blocks
 from scara_ident.identification.usable import usable_in_bands
 from scara_ident.inquiry.answerability import inquire, known_rows
 from scara_ident.inquiry.questions import Kind, Question, Suspect, questions
@@ -99,4 +99,4 @@ def test_of_what_the_motion_holds_too_few_periods_to_be_tried_is_named(kind: Kin
     (near,), (far,) = expected_answers(inquiry, [small]), expected_answers(inquiry, [wide])
     assert near.unshown == ("ripple of joint1",) and not near.settled
     assert near.instead == f"Would not tell: ripple of joint1. What would: {Slow.experiment}."
-    assert far.unshown == () and far.settled == (kind == "below_limit" or far.after >= SURE)
+    assert far.unshown == () and far.settled == (kind == "below_limit" or far.after >= SURE_STANDARD_ERRORS)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from scara_ident.fleet.changes import (
-    LEVEL,
+    FALSE_CHANGE_LEVEL,
     _Named,
     _needed,
     _search,
@@ -41,7 +41,7 @@ def test_the_worn_arm_is_named_with_cause_joint_size_and_date_and_no_other(histo
     assert first.cause.words == "Coulomb friction of joint2" and first.joint == "joint2"
     assert first.since in DATES[1:4] and first.gradual
     assert abs(first.size[0] - (WEAR[-1] - 1.0)) < 4.0 * np.sqrt(first.covariance[0, 0]) + 0.03
-    assert first.p_value < LEVEL and first.score > 5.0
+    assert first.p_value < FALSE_CHANGE_LEVEL and first.score > 5.0
 
 
 def test_one_date_tells_no_change(histories, noise):
@@ -79,7 +79,7 @@ def test_what_came_first_is_not_named_where_a_later_cause_leaves_nothing_of_it(h
     both = []
     for label in ("friction of joint2", "Coulomb friction of joint2"):
         trial = search.best(labels.index(label), worn.causes[labels.index(label)])
-        assert trial is not None and trial.p_value * 400.0 < LEVEL
+        assert trial is not None and trial.p_value * 400.0 < FALSE_CHANGE_LEVEL
         both.append(_Named(trial, trial, ()))
     (left,) = _needed(both, search, worn.causes, 400.0)
     assert left.trial is both[1].trial

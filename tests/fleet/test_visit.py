@@ -86,7 +86,13 @@ def test_an_arm_that_does_not_move_is_a_fault(folder, tmp_path):
 
 
 def test_a_long_file_is_a_visit_too(folder, histories, monkeypatch):
-    for name, size in {"MAX_SAMPLES": 500, "PART": 1_000, "KEPT": 1_000, "WINDOWS": 2, "LONGEST_WHOLE": 1_000}.items():
+    for name, size in {
+        "MAX_SAMPLES": 500,
+        "PART_SAMPLES": 1_000,
+        "KEPT_SAMPLES": 1_000,
+        "WINDOWS": 2,
+        "LONGEST_WHOLE": 1_000,
+    }.items():
         monkeypatch.setattr(long_file, name, size)
     visit, faults = look(ROBOT, "complete", [file_of(folder)], histories[0].visits[0].reference)
     assert (faults, visit is not None) == ((), True)

@@ -25,7 +25,7 @@ BANDS = [8.0, 8.0]
 @pytest.fixture(autouse=True)
 def _short_pieces(monkeypatch):
     monkeypatch.setattr(long_file, "MAX_SAMPLES", 2_000)
-    monkeypatch.setattr(long_file, "PART", 5_000)
+    monkeypatch.setattr(long_file, "PART_SAMPLES", 5_000)
 
 
 @pytest.fixture(scope="module")
@@ -89,7 +89,7 @@ def test_bands_chosen_and_events_found_are_those_of_the_whole_beside_another_rec
 def test_what_is_held_does_not_grow_and_all_samples_count_though_few_are_kept(run, tmp_path, monkeypatch):
     path = written(tmp_path, run)
     whole = identify(ROBOT, path, bands=BANDS)
-    monkeypatch.setattr(long_file, "KEPT", 4_500)
+    monkeypatch.setattr(long_file, "KEPT_SAMPLES", 4_500)
     monkeypatch.setattr(long_file, "WINDOWS", 3)
     monkeypatch.setattr(long_recordings, "MAX_BLOCKS", 20)
     kept = in_parts(monkeypatch, path)
@@ -111,7 +111,7 @@ def test_a_part_that_cannot_be_used_is_left_out_and_named(run, tmp_path, monkeyp
     path = written(tmp_path, replace(run, position=broken))
     with pytest.raises(RecordingError, match="row 9001"):
         read_recording(path, ROBOT)
-    monkeypatch.setattr(long_file, "KEPT", 4_500)
+    monkeypatch.setattr(long_file, "KEPT_SAMPLES", 4_500)
     monkeypatch.setattr(long_file, "WINDOWS", 3)
     found = identify(ROBOT, in_parts(monkeypatch, path), bands=BANDS)
     assert any("row 9001" in note and "left out, 1 of 4 parts" in note for note in found.notes)
@@ -127,7 +127,7 @@ def test_offsets_of_long_files_are_noise_too(tmp_path, monkeypatch):
     """Of three files, each with an offset of its own, a first moment was 6.5 standard deviations off, and a note ended in an error."""
     robot = load_robot(write_urdf(tmp_path / "arm.urdf", PLANAR_2R))
     monkeypatch.setattr(long_file, "LONGEST_WHOLE", 1_000)
-    monkeypatch.setattr(long_file, "KEPT", 4_000)
+    monkeypatch.setattr(long_file, "KEPT_SAMPLES", 4_000)
     monkeypatch.setattr(long_file, "WINDOWS", 2)
     found = {}
     for size in (0.0, 1.0):

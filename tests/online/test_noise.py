@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from scara_ident.online.filtered import row_filter
-from scara_ident.online.noise import GIVEN_ROWS, MOST, PositionNoise, TorqueNoise, inertia_at, too_wide
+from scara_ident.online.noise import GIVEN_ROWS, MAX_NOISE_SHARE, PositionNoise, TorqueNoise, inertia_at, too_wide
 from tests.online.made import RATE, model, signals, truth
 
 
@@ -96,9 +96,9 @@ def test_what_it_makes_is_a_mean_over_rows_of_which_few_say_nothing():
 
 def test_a_band_that_does_has_no_more_of_it_at_its_end_than_of_the_torques():
     joints, whole, rows = ("a", "b"), np.array([2.0, 4.0]), np.array([200.0, 1e6])
-    assert too_wide(MOST * whole, whole, rows, 10.0, joints) is None
+    assert too_wide(MAX_NOISE_SHARE * whole, whole, rows, 10.0, joints) is None
     # Of 200 rows the variance is known to a tenth.
-    more = np.array([1.15, 1.0]) * MOST * whole
+    more = np.array([1.15, 1.0]) * MAX_NOISE_SHARE * whole
     assert too_wide(more, whole, rows, 10.0, joints) is None
     assert too_wide(more, whole, 100.0 * rows, 10.0, joints) is not None
     said = too_wide(np.array([0.1, 3.0]), whole, rows, 10.0, joints)

@@ -23,7 +23,12 @@ WANTED = ("time", "joint1.position")
 
 @pytest.fixture(autouse=True)
 def _short(monkeypatch):
-    for name, size in {"MAX_SAMPLES": 600, "PART": 2_000, "KEPT": 2_000, "LONGEST_WHOLE": 4_000}.items():
+    for name, size in {
+        "MAX_SAMPLES": 600,
+        "PART_SAMPLES": 2_000,
+        "KEPT_SAMPLES": 2_000,
+        "LONGEST_WHOLE": 4_000,
+    }.items():
         monkeypatch.setattr(long_file, name, size)
 
 
@@ -64,7 +69,7 @@ def test_pieces_are_those_that_the_whole_is_cut_into(robot, gappy, monkeypatch):
     whole = stretches(read_recording(gappy, robot))
     monkeypatch.undo()
     monkeypatch.setattr(long_file, "MAX_SAMPLES", 600)
-    monkeypatch.setattr(long_file, "PART", 2_000)
+    monkeypatch.setattr(long_file, "PART_SAMPLES", 2_000)
     monkeypatch.setattr(long_file, "LONGEST_WHOLE", 4_000)
     found = find(gappy, "time", WANTED)
     assert found is not None

@@ -58,7 +58,7 @@ def test_copies_are_found_with_their_share(monkeypatch: pytest.MonkeyPatch, name
 
 
 def test_a_part_of_much_is_found_though_little_is_kept(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(module, "KEPT", 64)
+    monkeypatch.setattr(module, "KEPT_WINDOWS", 64)
     known = [recording(str(k), seed=k) for k in range(8)]
     ((found, first, _),) = shared_samples(known, [recording("new", seed=99), known[5]])
     assert found is known[5] is first

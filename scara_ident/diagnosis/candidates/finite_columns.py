@@ -9,20 +9,20 @@ import numpy as np
 from scara_ident.arrays import Array
 
 # No column of a torque is larger, in any unit; squares of products of larger ones overflow.
-LARGEST = 1e60
+MAX_COLUMN = 1e60
 
 
 def is_finite(columns: Array) -> bool:
     """Whether all of some columns are numbers that fits can take."""
     # Not so either where the largest is NaN.
-    return bool(np.max(np.abs(columns), initial=0.0) <= LARGEST)
+    return bool(np.max(np.abs(columns), initial=0.0) <= MAX_COLUMN)
 
 
 def finite_or_zero(columns: Array) -> Array:
     """Return columns, shape (..., k, N), zero those that are not finite somewhere."""
     if is_finite(columns):
         return columns
-    held = np.max(np.abs(columns), axis=-1, keepdims=True, initial=0.0) <= LARGEST
+    held = np.max(np.abs(columns), axis=-1, keepdims=True, initial=0.0) <= MAX_COLUMN
     return np.where(held, columns, 0.0)
 
 

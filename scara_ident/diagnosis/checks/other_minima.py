@@ -16,7 +16,7 @@ from scara_ident.diagnosis.candidates.candidates import Candidate, CandidateColu
 from scara_ident.diagnosis.checks.same_errors import same
 from scara_ident.diagnosis.fitting.effect_parameters import physical_parameters, size_is_determined
 from scara_ident.diagnosis.fitting.linearised import linearise
-from scara_ident.diagnosis.fitting.nonlinear_fit import MIN_DECREASE, RISE, tune
+from scara_ident.diagnosis.fitting.nonlinear_fit import MAX_RISE, MIN_DECREASE, tune
 from scara_ident.diagnosis.fitting.part_of_recordings import on_all, on_part
 from scara_ident.diagnosis.testing.selection_step import SelectionStep
 from scara_ident.effects import Parameter
@@ -27,7 +27,7 @@ from scara_ident.estimation.run_offsets import offsets_on
 # A fit that leaves so many times as much is no alternative, whatever rows will weigh in the end.
 ALTERNATIVE = 2.0
 # Fits whose nonlinear parameters differ by no larger share ended in the same minimum: so near do coarse ones come to it.
-SAME = 0.05
+SAME_MINIMUM_SHARE = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +54,7 @@ def lowest(step: SelectionStep) -> SelectionStep:
     alternatives = _alternatives(best)
     if alternatives and alternatives[0].near(best):
         other = _fitted(alternatives[0].step)
-        if other.error < (1.0 - RISE) * best.error:
+        if other.error < (1.0 - MAX_RISE) * best.error:
             best, alternatives = (
                 other,
                 [each for each in (best, *alternatives[1:]) if each.error < ALTERNATIVE * other.error],
@@ -80,7 +80,7 @@ def as_good(step: SelectionStep) -> Iterator[SelectionStep]:
     for member in step.chosen[places[0]].effect.unfound(step.scene, step.chosen[places[0]].member):
         further = replace(step.chosen[places[0]], member=member)
         other = tune(replace(step, chosen=(*step.chosen, further)))
-        if linearise(other).error < (1.0 - RISE) * linearise(step).error:
+        if linearise(other).error < (1.0 - MAX_RISE) * linearise(step).error:
             yield other
 
 
@@ -136,7 +136,10 @@ def _alternatives(own: _Fit) -> list[_Fit]:
 def _same(one: SelectionStep, other: SelectionStep) -> bool:
     """Whether two fits of the same effects ended in the same minimum, as near as coarse fits come."""
     pairs = zip(_acting(one), _acting(other), strict=True)
-    return all(np.allclose(mine.member.nonlinear, its.member.nonlinear, rtol=SAME, atol=0.0) for mine, its in pairs)
+    return all(
+        np.allclose(mine.member.nonlinear, its.member.nonlinear, rtol=SAME_MINIMUM_SHARE, atol=0.0)
+        for mine, its in pairs
+    )
 
 
 def _of_these(step: SelectionStep) -> bool:

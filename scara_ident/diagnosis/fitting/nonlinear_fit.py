@@ -18,20 +18,20 @@ from scara_ident.diagnosis.fitting.linearised import Linearised, linearise, move
 from scara_ident.diagnosis.testing.selection_step import SelectionStep
 
 # Steps of Gauss and Newton; most fits settle in three, and a search has further ones. A tied effect comes from far away.
-ROUNDS, TIED_ROUNDS = 6, 24
+MAX_STEPS, MAX_TIED_STEPS = 6, 24
 # Standard deviations: a step that is shorter for every parameter is the last.
-SETTLED = 0.1
+SETTLED_STDS = 0.1
 # Residual variances of a row: where the linear model promises no more, no parameter is further than a fifth of its standard deviation
 # from where it leads, and where gears meet their stops the error is no smoother than that.
-NOTHING = 0.04
+NEGLIGIBLE_GAIN = 0.04
 # A rise of the squared error by more than this share turns a step back; loads that settle may raise it by less.
-RISE = 1e-5
+MAX_RISE = 1e-5
 # A step that lowers the squared error by a smaller share is the last of a coarse fit.
 MIN_DECREASE = 0.03
 # Of what the linear model promises: a step that kept more may be longer next, and one that kept less was too long.
 GROW_RATIO, SHRINK_RATIO = 0.75, 0.25
 # A step that is turned back is tried again with no smaller share of its length.
-SHORTEST = 0.1
+MIN_STEP_SHARE = 0.1
 # No step is tried that is a smaller share of one that nothing holds back.
 MIN_RADIUS = 0.01
 
@@ -57,11 +57,11 @@ def tune(step: SelectionStep, *, coarse: bool = False) -> SelectionStep:
     best: Linearised | None = None
     way, radius, cut = np.zeros(0), np.inf, False
     tied = any(item.effect.tie(step.scene, item.member) is not None for item in step.chosen)
-    for _ in range(TIED_ROUNDS if tied else ROUNDS):
+    for _ in range(MAX_TIED_STEPS if tied else MAX_STEPS):
         now = linearise(step)
         if best is not None:
             radius = _radius(radius, best.length(way), _kept(best, now, way))
-        if best is not None and now.error > (1.0 + RISE) * best.error:
+        if best is not None and now.error > (1.0 + MAX_RISE) * best.error:
             if radius < MIN_RADIUS * best.length(best.step()):
                 break
         else:
@@ -95,7 +95,7 @@ def _settled(step: SelectionStep) -> SelectionStep:
     Columns that are made anew of each estimate lead there slowly where their effect is strong: these steps know how they change.
     """
     best, error = step, np.inf
-    for _ in range(ROUNDS):
+    for _ in range(MAX_STEPS):
         plain = linearise(step)
         state = with_estimate_slopes(step, plain)
         if state is plain or plain.error > error:
@@ -104,7 +104,7 @@ def _settled(step: SelectionStep) -> SelectionStep:
         started, std = estimate_of(step.scene, step.chosen), state.solve()[1][: state.linear]
         # What follows it is compared, which is the base model's.
         own = slice(0, step.observations.parameters)
-        if np.all(np.abs(state.value[own] - started[own]) <= SETTLED * std[own]):
+        if np.all(np.abs(state.value[own] - started[own]) <= SETTLED_STDS * std[own]):
             break
         step = replace(step, scene=at_estimate(step.scene, step.chosen, state.value))
     return best
@@ -116,11 +116,11 @@ def _is_short(state: Linearised, way: Array, std: Array, settling: NDArray[np.in
     Linear parameters that columns follow are to be near; nonlinear ones each, or so that all of them together promise next to nothing.
     """
     linear = np.abs(way[: state.linear] - estimate_of(state.scene, state.chosen))
-    if np.any(linear[settling] > SETTLED * std[settling]):
+    if np.any(linear[settling] > SETTLED_STDS * std[settling]):
         return False
     changes = zip(state.unknowns, way[state.linear :], strict=True)
     steps = np.array([abs(item.moved(x) - item.value) for item, x in changes])
-    return bool(np.all(steps <= SETTLED * std[state.linear :])) or state.gain(way) * state.rows <= NOTHING
+    return bool(np.all(steps <= SETTLED_STDS * std[state.linear :])) or state.gain(way) * state.rows <= NEGLIGIBLE_GAIN
 
 
 def _is_cut(state: Linearised, way: Array) -> bool:
@@ -139,7 +139,7 @@ def _radius(radius: float, length: float, kept: float) -> float:
     """Return how long the next step may be after one of a length that kept such a share of its promise."""
     if kept < 0.0:
         # Where the parabola through both errors, with the promised slope, has its least.
-        return length * max(SHORTEST, 0.5 / (1.0 - kept))
+        return length * max(MIN_STEP_SHARE, 0.5 / (1.0 - kept))
     if kept < SHRINK_RATIO:
         return 0.5 * length
     return max(radius, 2.0 * length) if kept > GROW_RATIO else radius

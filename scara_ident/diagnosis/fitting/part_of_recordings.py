@@ -12,7 +12,7 @@ from scara_ident.diagnosis.testing.selection_step import SelectionStep
 from scara_ident.estimation.run_offsets import offsets_on
 
 # Every effect is determined as well as by so many seconds of all recordings, s: of the slowest resonance that is tried a hundred periods.
-ENOUGH = 20.0
+ENOUGH_SECONDS = 20.0
 
 
 def on_part(step: SelectionStep) -> SelectionStep:
@@ -42,7 +42,7 @@ def _telling(step: SelectionStep) -> list[int]:
     strengths = _strengths(step)
     shares = strengths / np.maximum(np.sum(strengths, axis=1, keepdims=True), np.finfo(float).tiny)
     order = np.argsort(-np.sum(shares, axis=0), kind="stable")
-    enough = seconds * np.min(np.cumsum(shares[:, order], axis=1), axis=0) >= ENOUGH
+    enough = seconds * np.min(np.cumsum(shares[:, order], axis=1), axis=0) >= ENOUGH_SECONDS
     return sorted(order[: int(np.argmax(enough)) + 1 if np.any(enough) else None].tolist())
 
 

@@ -15,7 +15,7 @@ from scara_ident.arrays import Array
 # Directions whose singular value, columns scaled to unit length, is below this share of the largest take no step.
 STEPLESS = 1e-9
 # A step is as long as it may be to this share, which no fit notices.
-NEAR = 0.1
+RADIUS_TOLERANCE = 0.1
 # Multipliers between which one is looked for: below the least nothing is held back, above the most nothing moves.
 MIN_MULTIPLIER, MAX_MULTIPLIER = 1e-10, 1e6
 
@@ -82,16 +82,16 @@ def within_radius(columns: Array, target: Array, rooms: Sequence[tuple[float, fl
         Kept to a tenth of it.
     """
     found = within_room(columns, target, rooms)
-    if not length(columns, found) > (1.0 + NEAR) * radius:
+    if not length(columns, found) > (1.0 + RADIUS_TOLERANCE) * radius:
         return found
     size, none = np.diag(np.linalg.norm(columns, axis=0)), np.zeros(columns.shape[1])
     low, high = np.log(MIN_MULTIPLIER), np.log(MAX_MULTIPLIER)
-    while high - low > NEAR:
+    while high - low > RADIUS_TOLERANCE:
         middle = 0.5 * (low + high)
         rows = np.vstack([columns, np.exp(0.5 * middle) * size])
         found = within_room(rows, np.append(target, none), rooms)
         own = length(columns, found)
-        if abs(own - radius) <= NEAR * radius:
+        if abs(own - radius) <= RADIUS_TOLERANCE * radius:
             break
         low, high = (middle, high) if own > radius else (low, middle)
     return found

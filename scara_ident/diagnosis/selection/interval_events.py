@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from scara_ident.diagnosis.selection.search import SearchTask, scene_of
 from scara_ident.estimation import wls
 from scara_ident.estimation.observations import Observations
-from scara_ident.identification.events import SAME, Event
+from scara_ident.identification.events import SAME_OVERLAP, Event
 
 
 def not_explained(task: SearchTask, observations: Observations, events: Sequence[Event]) -> tuple[Event, ...]:
@@ -34,6 +34,6 @@ def not_explained(task: SearchTask, observations: Observations, events: Sequence
             for item in intervals
             if names[item.recording] == event.recording
         )
-        return max(both, default=0.0) >= SAME * (event.stop - event.start)
+        return max(both, default=0.0) >= SAME_OVERLAP * (event.stop - event.start)
 
     return tuple(event for event in events if not covered(event))

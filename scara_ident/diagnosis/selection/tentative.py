@@ -12,11 +12,11 @@ from scara_ident.diagnosis.checks.noise_check import BY_NOISE
 from scara_ident.diagnosis.selection.search import Search
 from scara_ident.diagnosis.testing.acceptance import Decision
 from scara_ident.diagnosis.testing.selection_step import best_of_each
-from scara_ident.motion.position_noise import LITTLE, noise_sizes
+from scara_ident.motion.position_noise import MIN_TRAVEL_SHARE, noise_sizes
 from scara_ident.robot.robot import Robot
 
 # Of more than this many, the most gaining first, nobody reads the rest; nothing is decided by it.
-MOST = 6
+MAX_TENTATIVE = 6
 # What settles an effect that noise may make, where motion is no remedy: the one that shows it best shows as much of that.
 LESS_NOISE = "record positions with less noise: time stamps with all their digits, no rounding"
 
@@ -75,7 +75,7 @@ def tentative_effects(
             words = candidate.effect.description(scene, candidate.member)
             settled = settled_by(found, [decision])
             result.append(TentativeEffect(name, joint, words, decision.why, settled, decision.gain, p_value, decision))
-    return tuple(result[:MOST])
+    return tuple(result[:MAX_TENTATIVE])
 
 
 def settled_by(found: Search, decisions: Sequence[Decision]) -> str:
@@ -88,7 +88,7 @@ def settled_by(found: Search, decisions: Sequence[Decision]) -> str:
     asked = range(robot.n) if None in joints else [joint for joint in joints if joint is not None]
     turn = np.where(robot.prismatic, np.inf, 2.0 * np.pi)
     reach = np.fmin(robot.upper - robot.lower, turn)
-    little = [j for j in asked if scene.travel[j] < LITTLE * reach[j] < np.inf]
+    little = [j for j in asked if scene.travel[j] < MIN_TRAVEL_SHARE * reach[j] < np.inf]
     if little:
         each = "; ".join(_moved(robot, j, float(scene.travel[j]), float(reach[j]), steps[j], noise[j]) for j in little)
         return f"move {', '.join(robot.joints[j] for j in little)} further and faster: {each}"

@@ -23,17 +23,17 @@ from scara_ident.diagnosis.testing.fitted_model import FittedModel, Products
 # Share of a direction that the other blocks must hold, or it cannot be tested without this one.
 _MIN_REDUNDANCY = 1e-6
 # Fewer degrees of freedom than this after those of several coefficients, and one direction alone is asked too.
-FEW = 10.0
+FEW_FREEDOM = 10.0
 # Blocks are weighted where one holds more than this share of a direction: more than all others together.
-MOST = 0.5
+MAX_BLOCK_SHARE = 0.5
 # Weights of blocks are chosen for a probability such as one candidate of some two hundred must have.
-ASKED = 1e-5
+TYPICAL_LEVEL = 1e-5
 # With fewer degrees of freedom no size is significant: it would take millions of standard errors.
 MIN_FREEDOM = 0.1
 # Directions of a few columns below this share of the largest are not tested.
 _RANK = 1e-9
 # Squares of columns that are none: the inverse of less leaves the range of numbers.
-_NOTHING = 1e-200
+_MIN_SQUARE = 1e-200
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +95,7 @@ def cluster_test(
     # What one block alone holds has no scatter of its own, and a covariance of rounding alone.
     least = np.where(known, _least(freedom), 0.0)
     together = _hotelling(whitened, unbiased, least, rank)
-    few = (rank > 1) & (least - rank + 1.0 < FEW)
+    few = (rank > 1) & (least - rank + 1.0 < FEW_FREEDOM)
     p_value = np.where(few, _either(together, whitened, unbiased, freedom, rank), together)
     result = ClusterTest(np.where(known, p_value, 1.0), value, into @ unbiased @ into.transpose(0, 2, 1), least)
     return _balanced(model, replace(products, columns=columns, scores=scores), result, (into, back, rank))
@@ -109,7 +109,7 @@ def _balanced(
 ) -> ClusterTest:
     """Return a test, of little freedom made by weighted blocks where effects can then be smaller and still significant."""
     into, back, rank = whitening
-    places, weights, _ = _weights(model, products, (into, rank), result.freedom, ASKED)
+    places, weights, _ = _weights(model, products, (into, rank), result.freedom, TYPICAL_LEVEL)
     if not len(places):
         return result
     into, few = into[places], _whitened(products, into, places)
@@ -145,10 +145,10 @@ def _weights(
     """Return which candidates need less by weighted blocks, their weights, and what all need, see `min_sizes`."""
     into, rank = whitening
     sizes = np.array([needed(k, v, chance) if k else np.inf for k, v in zip(rank, freedom, strict=True)])
-    places = np.flatnonzero((freedom < FEW) & (rank > 0))
+    places = np.flatnonzero((freedom < FEW_FREEDOM) & (rank > 0))
     few = _whitened(products, into, places)
     if len(places):
-        places = places[np.max(shares_of(model, few, np.ones(few.columns.shape[:2])), axis=1) > MOST]
+        places = places[np.max(shares_of(model, few, np.ones(few.columns.shape[:2])), axis=1) > MAX_BLOCK_SHARE]
         few = _whitened(products, into, places)
     weights, bent = np.ones(few.columns.shape[:2]), np.zeros(len(places), dtype=bool)
     each = weights
@@ -217,7 +217,7 @@ def needed(count: int, freedom: float, chance: float) -> float:
     if freedom < MIN_FREEDOM:
         return np.inf
     rest = freedom - count + 1.0
-    few = count > 1 and rest < FEW
+    few = count > 1 and rest < FEW_FREEDOM
     share = 0.5 * chance if few else chance
     together = np.sqrt(fdtri(count, rest, 1.0 - share) * freedom * count / rest) if rest > MIN_FREEDOM else np.inf
     alone = np.sqrt(fdtri(1.0, freedom, 1.0 - share / count)) if few and freedom > 0.0 else np.inf
@@ -269,7 +269,7 @@ def significance(value: Array, covariance: Array, freedom: float, products: Arra
     whitened, spread = back @ value, back @ covariance[None] @ back.transpose(0, 2, 1)
     each = np.full(whitened.shape, freedom)
     together = _hotelling(whitened, spread, each[:, 0], rank)
-    few = (rank > 1) & (freedom - rank + 1.0 < FEW)
+    few = (rank > 1) & (freedom - rank + 1.0 < FEW_FREEDOM)
     return float(np.where(few, _either(together, whitened, spread, each, rank), together)[0])
 
 
@@ -303,9 +303,9 @@ def _whitening(whole: Array) -> tuple[Array, Array, NDArray[np.intp]]:
     """Return A with ``A' W A = 1`` where W says something, its inverse there, and in how many directions that is."""
     # Of a column within the model rounding may leave less than nothing.
     squares = np.diagonal(whole, axis1=1, axis2=2)
-    size = np.sqrt(np.where(squares > _NOTHING, squares, 1.0))
+    size = np.sqrt(np.where(squares > _MIN_SQUARE, squares, 1.0))
     values, vectors = np.linalg.eigh(whole / (size[:, :, None] * size[:, None, :]))
-    kept = (values > _RANK * values[:, -1:]) & (values > _NOTHING)
+    kept = (values > _RANK * values[:, -1:]) & (values > _MIN_SQUARE)
     root = np.sqrt(np.where(kept, values, 1.0))
     into = np.where(kept[:, None], vectors / root[:, None] / size[:, :, None], 0.0)
     back = np.where(kept[:, None], vectors * root[:, None] * size[:, :, None], 0.0)

@@ -25,7 +25,7 @@ MIN_REDUNDANCY = 1e-9
 # A block whose products have a smaller norm leaves a tenth of every direction to the others.
 WELL_SHARED = 0.9
 # Up to so many signals for each direction they are solved for in less time than the inverse is made.
-FEW = 0.5
+FEW_SIGNALS = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,14 +136,14 @@ class FittedModel:
 
     def ready_for(self, count: int) -> None:
         """Make what so many signals in all will need, once, and not in two threads."""
-        if count >= FEW * self.root.shape[1]:
+        if count >= FEW_SIGNALS * self.root.shape[1]:
             _ = self.released
 
     def reaching(self, signals: Array) -> Array:
         """Return signals of blocks, shape (g, blocks, k, r), times `released`, which is not made for a few of them."""
         g, blocks, k, r = signals.shape
         rows = signals.transpose(1, 0, 2, 3).reshape(blocks, g * k, r)
-        few = g * k < FEW * r and "released" not in self.__dict__
+        few = g * k < FEW_SIGNALS * r and "released" not in self.__dict__
         found = self._released(rows.transpose(0, 2, 1)).transpose(0, 2, 1) if few else rows @ self.released
         return np.asarray(found.reshape(blocks, g, k, r).transpose(1, 0, 2, 3))
 

@@ -22,7 +22,7 @@ from scara_ident.diagnosis.testing.fitted_model import FittedModel
 # The noise is forgotten where its autocorrelation first falls below this.
 FORGOTTEN = 0.1
 # Longest memory that is looked for, as a share of a joint's rows.
-LONGEST = 0.25
+MAX_MEMORY_SHARE = 0.25
 # Of a block, within which what is left on a candidate's joints must be forgotten for rows to be counted: their level was
 # shown for noise that is. What is remembered longer is no noise, but something that is still missing.
 NOISE_WITHIN = 0.5
@@ -89,6 +89,6 @@ def _memory(left: Array) -> int:
     """Return over how many rows a residual remembers: twice the lag at which its autocorrelation has fallen."""
     count = len(left)
     power = np.abs(np.fft.rfft(left, 2 * count)) ** 2
-    correlation = np.fft.irfft(power)[: max(2, int(LONGEST * count))]
+    correlation = np.fft.irfft(power)[: max(2, int(MAX_MEMORY_SHARE * count))]
     low = np.flatnonzero(correlation < FORGOTTEN * correlation[0])
     return 2 * int(low[0] if len(low) else len(correlation))

@@ -29,7 +29,7 @@ from scara_ident.threads import one_blas_thread
 # A body that lacks less than this share of the nominal one lacks nothing but the solver's digits.
 ROUNDING = 1e-7
 # Bodies further inside than this share of the nominal ones need no further search.
-ENOUGH = 0.5
+ENOUGH_MARGIN = 0.5
 # Contradictions that are listed; more would not help anyone.
 MAX_REASONS = 5
 # A base parameter whose multiplier contributes less than this to the margin is not needed for a contradiction.
@@ -185,11 +185,11 @@ def furthest_inside(unknowns: Unknowns, value: Array, given: Fixed) -> BestArm:
         for z, (cone, _) in zip(np.split(dual, np.cumsum([len(c.offset) for c, _ in cones])[:-1]), cones, strict=True)
     )
     multipliers = (given.inverse.T @ force)[: len(given.combinations)]
-    return BestArm(x, min(u.margin(x), ENOUGH), bound, multipliers)
+    return BestArm(x, min(u.margin(x), ENOUGH_MARGIN), bound, multipliers)
 
 
 def _largest_margin(matrix: Array, offset: Array, kinds: list[tuple[str, int]]) -> tuple[Array, Array, float] | None:
-    """Maximise t <= ENOUGH such that ``offset - matrix @ (move, t)`` lies in the cones; None if no t does.
+    """Maximise t <= ENOUGH_MARGIN such that ``offset - matrix @ (move, t)`` lies in the cones; None if no t does.
 
     Returns the move, the multipliers and an upper bound of t. Clarabel is called without cvxpy here: to name what
     contradicts what, up to 50 of these are solved with other rows each, and on the arm of UR5 one takes 5 ms instead of
@@ -218,7 +218,7 @@ def _largest_margin(matrix: Array, offset: Array, kinds: list[tuple[str, int]]) 
             sp.csc_matrix((size, size)),
             last,
             sp.csc_matrix(np.vstack([matrix, -last])),
-            np.append(offset / scale, ENOUGH / scale),
+            np.append(offset / scale, ENOUGH_MARGIN / scale),
             [*(cone[kind](length) for kind, length in kinds), cone["nonnegative"](1)],
             settings,
         )

@@ -38,10 +38,10 @@ from scara_ident.model.terms import Offset
 
 # The data distinguish a direction from nominal at this many standard deviations; then the prior moves it by this share
 # of one.
-SIGNIFICANT = 4.0
+SIGNIFICANT_STDS = 4.0
 MAX_BIAS = 0.05
 # No arm differs from its nominal one by more than this factor; a larger standard deviation distinguishes nothing.
-FARTHEST = 1e5
+MAX_NOMINAL_FACTOR = 1e5
 # What is constant is rather this share of the torque.
 OFFSET_SHARE = 0.1
 # Singular values below this share of the largest are made of rounding.
@@ -51,8 +51,8 @@ ROUNDING = 1e-12
 PRECISION = 1e-10
 # A start that is far heavier than nominal approaches it by lighter and lighter nominal arms, each this factor lighter,
 # and each reached to a rough precision only.
-STRIDE = 4.0
-ROUGH = 1e-2
+CONTINUATION_FACTOR = 4.0
+CONTINUATION_PRECISION = 1e-2
 MAX_STEPS = 100
 LINE_STEPS = 12
 # Weights of the logarithmic barrier of limits; the last is too small to move anything.
@@ -82,7 +82,9 @@ def prior_rows(u: Unknowns, rows: Array, target: Array, weight: float) -> Array:
     left, singular, right = np.linalg.svd(scaled, full_matrices=False)
     # Distance from nominal in standard deviations, z / s, with s = 1 / singular.
     apart = np.abs(left.T @ (target - rows @ u.reference))
-    significant = (apart > SIGNIFICANT) & (singular * FARTHEST > 1.0) & (singular > ROUNDING * singular[0])
+    significant = (
+        (apart > SIGNIFICANT_STDS) & (singular * MAX_NOMINAL_FACTOR > 1.0) & (singular > ROUNDING * singular[0])
+    )
     reduced = np.minimum(weight, MAX_BIAS * singular[significant] ** 2 / apart[significant])
     directions = right[significant]
     form = np.sqrt(weight) * np.eye(u.size)
@@ -160,8 +162,8 @@ def nearest_to_nominal(start: Array, free: Array, limits: Sequence[Cone] = (), r
     # The share of its weight at which the nominal arm is as heavy as the start.
     heavy = 5.0 * n / max(5.0 * n, float(np.tile(PACKED_IDENTITY, n) @ start[: 10 * n] + start[10 * n :].sum()))
     while heavy < 1.0:
-        x = _newton(x, free, _Cost(limits, rotors, weights[0], heavy), ROUGH)
-        heavy *= STRIDE
+        x = _newton(x, free, _Cost(limits, rotors, weights[0], heavy), CONTINUATION_PRECISION)
+        heavy *= CONTINUATION_FACTOR
     for weight in weights:
         x = _newton(x, free, _Cost(limits, rotors, weight, 1.0), PRECISION)
     return x

@@ -37,7 +37,7 @@ from scara_ident.estimation.run_offsets import beside_offsets
 from scara_ident.model.terms.constraints import BrakingPolynomial
 
 # A shape is contradicted where data such as these are this rare under it.
-LEVEL = 0.01
+SIGNIFICANCE_LEVEL = 0.01
 # Standard deviation of a parameter that the data leave open, over the size of all others.
 OPEN = 1e6
 
@@ -86,7 +86,7 @@ def choose_shapes(
             found.append(ShapeChoice(polynomial.joint, "dissipative", None, why))
         else:
             p_value = lubricated_p_value(polynomial, observations, plain)
-            contradicted = p_value < LEVEL
+            contradicted = p_value < SIGNIFICANCE_LEVEL
             why = "the data contradict the lubricated shape" if contradicted else "the data do not contradict it"
             found.append(ShapeChoice(polynomial.joint, "dissipative" if contradicted else "lubricated", p_value, why))
     return tuple(found)

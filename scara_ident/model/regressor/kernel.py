@@ -20,7 +20,7 @@ from scara_ident.manners import Frozen
 from scara_ident.model.regressor.program import Program
 from scara_ident.model.regressor.recursion import JointGeometry, joint_geometry, trace_regressor
 from scara_ident.model.regressor.tracing import compile_program
-from scara_ident.threads import LONG, THREADS, side_by_side, works_alone
+from scara_ident.threads import LONG_ARRAY, THREADS, side_by_side, works_alone
 
 PARAMETERS = ("m", "mcx", "mcy", "mcz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
 """Standard parameters of a body in Pinocchio's order; the inertia is about the origin of the joint's frame."""
@@ -35,7 +35,7 @@ recordings side by side took half as long again as one after the other, of these
 """
 _TOLERANCE = 1e-10
 _SMALLEST_SCALE = 1e-3
-_NOTHING = 1e-9
+_ROUNDING = 1e-9
 """Entries of this size, at speeds and accelerations of order 10, are rounding."""
 _STATES = 48
 
@@ -114,7 +114,7 @@ class RegressorKernel(Frozen):
         states = [row for part in self._parts(q, v, a) for row in part]
         samples = len(states[0])
         count = max(1, -(-samples // _CHUNK))
-        if not works_alone() and samples >= THREADS * LONG:
+        if not works_alone() and samples >= THREADS * LONG_ARRAY:
             count = THREADS * -(-count // THREADS)
         # Equal chunks, so that the last is not a short one.
         length = max(1, -(-samples // count))
@@ -244,7 +244,7 @@ def _check(kernel: RegressorKernel, model: pin.Model) -> None:
     for kind in range(3):
         same = kinds == kind
         size = largest[same].max()
-        largest[same] = np.maximum(largest[same], _SMALLEST_SCALE * (size if size > _NOTHING else 1.0))
+        largest[same] = np.maximum(largest[same], _SMALLEST_SCALE * (size if size > _ROUNDING else 1.0))
     difference = np.abs(kernel(q, v, a) - everything[:, kernel.columns]).max(axis=2)
     relative = difference / largest[kernel.columns]
     relative[np.isnan(relative)] = np.inf

@@ -20,15 +20,15 @@ MISSING_ROWS = 5
 # ... and, away from its ends, in runs of at most this many: longer ones are a fault of the log that should be seen.
 MISSING_RUN = 10
 # Slower than 5 Hz no arm is servoed, faster than 100 kHz none is logged: such a clock does not count seconds.
-SLOWEST, FASTEST = 0.2, 1e-5
+MAX_INTERVAL, MIN_INTERVAL = 0.2, 1e-5
 CLOCKS = (("milliseconds", 1e3), ("microseconds", 1e6), ("nanoseconds", 1e9))
 # A robot is usually logged near 500 Hz; of two readings of a clock, the one nearer to this is meant.
 USUAL_INTERVAL = 2e-3
 # Beyond this share the clock is too coarse, and what is kept would depend on which row came first.
 REPEATED_SHARE = 0.05
-# On a clock whose steps up to LATE vary by less than STEADY, a step within NEAR (three times that variation, if it is
+# On a clock whose steps up to LATE_STEPS vary by less than STEADY_SHARE, a step within WHOLE_STEP_TOLERANCE (three times that variation, if it is
 # more) of two or more whole steps is a sample lost; any other long step is a sample late.
-LATE, STEADY, NEAR = 1.5, 0.1, 0.1
+LATE_STEPS, STEADY_SHARE, WHOLE_STEP_TOLERANCE = 1.5, 0.1, 0.1
 # Below this, taking the interval as constant misplaces a position by less than a thirtieth of what it travels a sample.
 JITTER = 0.03
 # Stamps of an uneven clock that are rounded to this share of the interval misplace the positions by more than most encoders.
@@ -77,9 +77,9 @@ def clock_unit(samples: Samples) -> Checked:
     if not len(step):
         samples.refuse("time never advances; it must be in seconds and grow from row to row")
     median = float(np.median(step))
-    if FASTEST <= median <= SLOWEST:
+    if MIN_INTERVAL <= median <= MAX_INTERVAL:
         return samples, []
-    fitting = [(n, f) for n, f in CLOCKS if FASTEST <= median / f <= SLOWEST]
+    fitting = [(n, f) for n, f in CLOCKS if MIN_INTERVAL <= median / f <= MAX_INTERVAL]
     if fitting:
         name, factor = min(fitting, key=lambda item: abs(np.log(median / item[1] / USUAL_INTERVAL)))
         guess = f"it looks like {name}, divide by {factor:g}"
@@ -125,12 +125,12 @@ def sampling(samples: Samples) -> Checked:
     median = float(np.median(step))
     # A step over rows that were left out is none of the clock's; where those were copies, no time went by in them.
     left_out = np.minimum(median * (np.diff(samples.row) - 1), step - median)
-    step = np.where(step > LATE * median, step - left_out, step)
+    step = np.where(step > LATE_STEPS * median, step - left_out, step)
     gap = step > GAP_STEPS * median
-    late = step > LATE * median
+    late = step > LATE_STEPS * median
     unsteady = float(np.std(step[~late])) / median
-    near = np.abs(step / median - np.rint(step / median)) < max(NEAR, 3 * unsteady)
-    lost = late & ~gap & near & (unsteady < STEADY)
+    near = np.abs(step / median - np.rint(step / median)) < max(WHOLE_STEP_TOLERANCE, 3 * unsteady)
+    lost = late & ~gap & near & (unsteady < STEADY_SHARE)
     usual = step[~(gap | lost)]
     jitter = float(np.std(usual)) / median
     found = []

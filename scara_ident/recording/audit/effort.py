@@ -30,9 +30,9 @@ DEAD_SHARE = 0.5
 NOISELESS, OUTLASTING = 0.5, 10.0
 # Where more than this share of the other samples repeats the one before, values last by chance: rounded to steps like its
 # noise an effort does so for 0.3 s at 10 Hz. Less than this expected number of such runs in a recording is no chance.
-SOMETIMES, CHANCE = 0.02, 1e-3
+REPEATED_SHARE, CHANCE = 0.02, 1e-3
 # An effort without noise is one value as well while all joints keep their speed, to this share of the way.
-STEADY = 1e-3
+STEADY_SHARE = 1e-3
 # Differences of this order and the next tell noise, which makes the next larger; rounding makes it so many smallest steps.
 ORDER, ROUNDING_STEPS = 4, 4.0
 # A saturated amplifier holds its extreme for this many samples in a row, ...
@@ -202,7 +202,7 @@ def _by_chance(share: float, lengths: NDArray[np.intp], count: int) -> float:
     count : int
         Samples of the recording.
     """
-    if share < SOMETIMES or share > NOISELESS:
+    if share < REPEATED_SHARE or share > NOISELESS:
         return 0.0
     # Where the effort is flat it repeats itself more often: a third sample tells how often, among the shortest runs.
     two, three = (int(np.sum(lengths == samples)) for samples in (2, 3))
@@ -231,7 +231,7 @@ def _steady(samples: Samples, first: int, last: int) -> bool:
     for joint, position in enumerate(samples.position[:, first : last + 1]):
         off = np.max(np.abs(position - np.polyval(np.polyfit(time, position, 1), time)))
         # A joint that rests may do so on the edge between two steps of its encoder.
-        if off > max(STEADY * max(np.ptp(position), small[joint]), 2.0 * resolution(samples.position[joint])):
+        if off > max(STEADY_SHARE * max(np.ptp(position), small[joint]), 2.0 * resolution(samples.position[joint])):
             return False
     return True
 

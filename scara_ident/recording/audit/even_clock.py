@@ -13,9 +13,9 @@ from scara_ident.arrays import NORMAL_MEDIAN, Array
 from scara_ident.recording.audit.samples import GAP_STEPS, Samples
 
 # Samples on either side over which the even clock is the median of the stamps, and over which a lost sample shows.
-REACH, LOST_REACH = 50, 4
+MEDIAN_REACH, LOST_REACH = 50, 4
 # Of fewer samples than twice that reach and more no even clock is found.
-ENOUGH = 4 * REACH
+MIN_SAMPLES = 4 * MEDIAN_REACH
 # An interval over so few samples is that of a step where few are lost; over many it is known better.
 NEARBY = 10
 # It is longer than the usual step by more than this where many are lost; jitter moves the usual step by less.
@@ -24,10 +24,10 @@ SAME_INTERVAL = 0.03
 # the speed bends little.
 SPEED_ROWS = 4
 # A step says how long it is where its speed is above this share of the usual one.
-MOVING = 0.2
+MOVING_SHARE = 0.2
 # How many intervals a step has is known where its length is to this share of an interval (std): the next number is ten of
 # these away.
-KNOWN = 0.1
+KNOWN_STD = 0.1
 # No step is of no interval: where this share seems to be, the way is one of an encoder's coarse steps or none.
 NO_WAY = 0.01
 # Speeds by the stamps tell the intervals, these tell better speeds; the third time little changes any more.
@@ -40,7 +40,7 @@ def even_clocks(samples: Samples) -> list[Array]:
     Parameters
     ----------
     samples : Samples
-        At least `ENOUGH` of them, in order of time.
+        At least `MIN_SAMPLES` of them, in order of time.
 
     Returns
     -------
@@ -57,7 +57,9 @@ def even_clocks(samples: Samples) -> list[Array]:
     if by_positions is not None:
         steps, determined = by_positions
         count = np.concatenate([[0.0], np.cumsum(steps)])
-        over_many = (time[2 * REACH :] - time[: -2 * REACH]) / (count[2 * REACH :] - count[: -2 * REACH])
+        over_many = (time[2 * MEDIAN_REACH :] - time[: -2 * MEDIAN_REACH]) / (
+            count[2 * MEDIAN_REACH :] - count[: -2 * MEDIAN_REACH]
+        )
         clocks.append(_clock(time, float(np.median(over_many)), steps, determined))
     return clocks
 
@@ -77,19 +79,19 @@ def _clock(time: Array, interval: float, steps: Array, determined: NDArray[np.bo
     # Beyond its ends the recording goes on as there: so a gap behind its first sample is one.
     ahead = median_filter(ahead, 2 * LOST_REACH + 1, mode="nearest")
     # What is late for a while comes back; what is lost stays.
-    lost = _lost(minimum_filter1d(ahead, REACH, mode="nearest", origin=-(REACH // 2)), determined)
+    lost = _lost(minimum_filter1d(ahead, MEDIAN_REACH, mode="nearest", origin=-(MEDIAN_REACH // 2)), determined)
     even = interval * (count + lost)
     # A clock that drifts is even all the same, and behind a gap it starts anew.
     edges = np.flatnonzero(np.diff(lost) >= GAP_STEPS - 1.0) + 1
-    off = [median_filter(part, 2 * REACH + 1, mode="mirror") for part in np.split(time - even, edges)]
-    smooth = [uniform_filter1d(part, 2 * REACH + 1, mode="mirror") for part in off]
+    off = [median_filter(part, 2 * MEDIAN_REACH + 1, mode="mirror") for part in np.split(time - even, edges)]
+    smooth = [uniform_filter1d(part, 2 * MEDIAN_REACH + 1, mode="mirror") for part in off]
     return np.asarray(even + np.concatenate(smooth))
 
 
 def _interval(time: Array, near: float) -> float:
     """Return the interval of samples of which few are lost."""
     interval = near
-    for reach in (2 * NEARBY, 4 * NEARBY, 2 * REACH):
+    for reach in (2 * NEARBY, 4 * NEARBY, 2 * MEDIAN_REACH):
         way = time[reach:] - time[:-reach]
         # Over more samples it is known better; over fewer it was known well enough to see lost ones among these.
         interval = float(np.median(way / np.maximum(reach, np.rint(way / interval))))
@@ -104,7 +106,7 @@ def _lost(ahead: Array, determined: NDArray[np.bool_]) -> Array:
         jump = round(value - level - total)
         if jump > 0 and free[k]:
             total += jump
-        level += (value - total - level) / REACH
+        level += (value - total - level) / MEDIAN_REACH
         lost[k] = total
     return lost
 
@@ -142,8 +144,8 @@ def _by_positions(samples: Samples, usual: float) -> tuple[Array, NDArray[np.boo
     for _ in range(ROUNDS):
         speed = (position[:, after] - position[:, before]) / (time[after] - time[before])
         size = np.sum(weight * speed**2, axis=0)
-        moving = ~gap & (size > MOVING**2 * float(np.mean(size, where=~gap)))
-        if np.count_nonzero(moving) < ENOUGH:
+        moving = ~gap & (size > MOVING_SHARE**2 * float(np.mean(size, where=~gap)))
+        if np.count_nonzero(moving) < MIN_SAMPLES:
             return None
         length = np.sum(weight * speed * way, axis=0) / np.maximum(size, np.finfo(float).tiny)
         interval = _midmean(length[moving])
@@ -151,7 +153,7 @@ def _by_positions(samples: Samples, usual: float) -> tuple[Array, NDArray[np.boo
             return None
         intervals = length / interval
         off = np.abs(intervals - np.rint(intervals)) * np.sqrt(size)
-        known = moving & (float(np.median(off[moving])) / NORMAL_MEDIAN < KNOWN * np.sqrt(size))
+        known = moving & (float(np.median(off[moving])) / NORMAL_MEDIAN < KNOWN_STD * np.sqrt(size))
         none = known & (intervals < 0.5)
         if 2 * np.count_nonzero(known) < np.count_nonzero(moving) or np.mean(none[known]) > NO_WAY:
             return None

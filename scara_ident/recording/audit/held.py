@@ -10,7 +10,7 @@ from scara_ident.manners import several
 from scara_ident.recording.audit.samples import Checked, Finding, Samples, resolution, runs
 
 # A joint moves where its speed is above this share of its rms speed over the recording.
-MOVING = 0.2
+MOVING_SHARE = 0.2
 # Rows on either side over which that speed is taken: enough for an encoder's steps to average out.
 MOVING_ROWS = 3
 # Rows that repeat every channel are a hold, not a coincidence of quantised channels, from this share of the moving rows
@@ -23,7 +23,7 @@ DISTINCT = 4.0
 # A log about as fast as its source tells no rate of it: the usual step without copies is longer by more than this.
 SLOWER = 1.2
 # Such repetitions are none of chance where as many would be seen by chance in fewer than this share of recordings.
-UNLIKELY = 1e-3
+CHANCE_LEVEL = 1e-3
 # All channels standing still for longer, and then jumping on, is a logger that stalled.
 FREEZE_SECONDS = 0.2
 # A jump out of a freeze is this many times longer than the steps beside it; an arm that rested moves off smoothly.
@@ -103,7 +103,7 @@ def _moving(samples: Samples, active: NDArray[np.intp], fresh: NDArray[np.intp])
     """Tell during which samples each active joint moves, shape (n, N), from the `fresh` samples alone."""
     travel, rows = _travel(samples, active, fresh)
     speed = travel / np.maximum(samples.time[rows[1]] - samples.time[rows[0]], samples.interval)
-    moving = speed > MOVING * np.sqrt(np.mean(speed**2, axis=1, keepdims=True))
+    moving = speed > MOVING_SHARE * np.sqrt(np.mean(speed**2, axis=1, keepdims=True))
     over: NDArray[np.bool_] = np.repeat(moving, np.diff(np.concatenate((fresh, [samples.count]))), axis=1)
     return over
 
@@ -206,11 +206,11 @@ def _is_hold(samples: Samples, same: NDArray[np.bool_], judged: NDArray[np.bool_
     whole = int(np.count_nonzero(mine))
     if count / whole - chance <= HELD_OF_REPEATS * (1.0 - chance):
         return False
-    return bool(bdtrc(count - 1, whole, chance) < UNLIKELY)
+    return bool(bdtrc(count - 1, whole, chance) < CHANCE_LEVEL)
 
 
 def _by_chance(count: int, expected: float) -> bool:
     """Whether so many may be seen by chance where so many are expected."""
     from scipy.special import pdtrc
 
-    return count < 1 or bool(pdtrc(count - 1, expected) >= UNLIKELY)
+    return count < 1 or bool(pdtrc(count - 1, expected) >= CHANCE_LEVEL)

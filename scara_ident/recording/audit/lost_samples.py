@@ -13,9 +13,9 @@ from scara_ident.recording.audit.samples import Checked, Finding, Samples
 # Samples on either side of a step that a parabola with a jump at the step is fitted to.
 SIDE = 3
 # A joint says something where its speed is above this share of its rms speed.
-MOVING = 0.2
+MOVING_SHARE = 0.2
 # Fewer such samples do not tell how large its jumps are without a loss; nor fewer judged steps how often there is one.
-ENOUGH = 200
+MIN_SAMPLES = 200
 # A step is judged where the samples missing in it are known to so many (std), and some are missing from here on: of one,
 # nearer to one than to none by two of these; and where the arm is slow against the noise, of many by five.
 LEVELS = ((0.1, 0.7), (0.5, 3.0))
@@ -26,18 +26,18 @@ SHADOW = 0.6
 # So many samples that are usually lost at once are reported: such a log waits for something now and then, as for a plot.
 SEVERAL = 2
 # Beyond this share of the steps, or of the samples, velocities and accelerations are not those of the arm; below it, it is said ...
-MOST = 0.01
+MAX_LOST_SHARE = 0.01
 # ... from this share on, and from so many.
-LEAST, FEWEST = 1e-3, 3
+MIN_LOST_SHARE, MIN_LOST = 1e-3, 3
 # A step in time that differs from the median by more than this share is one that the clock tells itself.
-EVEN = 0.3
+EVEN_SHARE = 0.3
 # Rounding of positions, as a share of the way of the fastest sample.
 ROUNDING = 1e-4
 
 
 def restamped(samples: Samples) -> Checked:
     """Refuse a recording in which many samples are lost that the clock does not show; say it of few."""
-    if samples.count < ENOUGH:
+    if samples.count < MIN_SAMPLES:
         return samples, []
     missing, std = _missing(samples)
     for known, least in LEVELS:
@@ -55,7 +55,7 @@ def _judged(samples: Samples, missing: Array, least: float) -> Finding | None:
     count = int(np.count_nonzero(ahead)) - int(np.count_nonzero(back))
     lost, late = float(np.sum(missing[ahead])), -float(np.sum(missing[back]))
     share, gone = count / max(total, 1), (lost - late) / max(total, 1)
-    if total < ENOUGH or count < max(FEWEST, LEAST * total) or lost < AHEAD * late:
+    if total < MIN_SAMPLES or count < max(MIN_LOST, MIN_LOST_SHARE * total) or lost < AHEAD * late:
         return None
     usual = round(float(np.median(np.sort(missing[ahead])[np.count_nonzero(back) :])))
     what = (
@@ -65,7 +65,7 @@ def _judged(samples: Samples, missing: Array, least: float) -> Finding | None:
         f"first before {samples.where(int(np.argmax(ahead)) + 1)}, and in all about {100 * gone:.2g} are missing "
         "for every 100 recorded"
     )
-    if max(share, gone) > MOST:
+    if max(share, gone) > MAX_LOST_SHARE:
         samples.refuse(f"{what}; record again, with the time at which each sample was taken")
     return Finding("restamped", f"{what}: used as it is ({several(count, 'jump')})", count)
 
@@ -80,11 +80,11 @@ def _missing(samples: Samples) -> tuple[Array, Array]:
     fit = np.linalg.pinv(np.column_stack([np.ones_like(place), place, place**2, place > 0]))
     window = sliding_window_view(samples.position, 2 * SIDE, axis=1)
     way, jump = window @ fit[1], window @ fit[3]
-    moving = np.abs(way) > MOVING * np.sqrt(np.mean(_undisturbed(way) ** 2, axis=1, keepdims=True))
+    moving = np.abs(way) > MOVING_SHARE * np.sqrt(np.mean(_undisturbed(way) ** 2, axis=1, keepdims=True))
     weight, idle = np.zeros_like(way), samples.idle()
     for j, inside in enumerate(moving):
         # Of a joint that stands still all is rounding.
-        if np.count_nonzero(inside) >= ENOUGH and not idle[j]:
+        if np.count_nonzero(inside) >= MIN_SAMPLES and not idle[j]:
             # Losses within less than half of the windows leave it alone.
             usual = float(np.median(np.abs(jump[j, inside]))) / NORMAL_MEDIAN
             floor = ROUNDING * float(np.max(np.abs(way[j])))
@@ -117,5 +117,5 @@ def _shadows(missing: Array) -> NDArray[np.bool_]:
 def _even(samples: Samples) -> NDArray[np.bool_]:
     """Tell in which windows of samples the clock is even, shape (N - 2 SIDE + 1,)."""
     step = np.diff(samples.time)
-    uneven = np.abs(step - samples.interval) > EVEN * samples.interval
+    uneven = np.abs(step - samples.interval) > EVEN_SHARE * samples.interval
     return np.asarray(~np.any(sliding_window_view(uneven, 2 * SIDE - 1), axis=1))

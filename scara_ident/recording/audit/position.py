@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from scara_ident.robot.robot import Robot
 
 # Positions are judged by these percentiles and speeds by that one, so that a few wild samples decide nothing.
-LOW, HIGH, FAST = 2.0, 98.0, 95.0
+LOW_PERCENTILE, HIGH_PERCENTILE, FAST_PERCENTILE = 2.0, 98.0, 95.0
 # Speed is taken over this many samples, in which steps and noise of an encoder average out.
 SPEED_ROWS = 20
 # Another unit is sought where positions lie beyond the limits by this share of the range (real arms have been seen a
@@ -60,7 +60,7 @@ DIFFERENCES = 10
 GAIN = math.sqrt(math.comb(2 * DIFFERENCES, DIFFERENCES))
 # Of an encoder of 24 bits before a gear of 160 steps leave 3e-10 of the largest position or more; of computed numbers rounding
 # leaves 1e-16, and a motion of 2 Hz at 125 Hz 3e-13.
-NOTHING = 1e-11
+ROUNDING_SHARE = 1e-11
 # So many places in motion tell.
 MIN_MOVING_SAMPLES = 100
 # The counts of 32 bits end at 4e9; what a broken channel or a wrong type of number gives has up to 300 digits.
@@ -98,7 +98,7 @@ class _Reading(NamedTuple):
 def position_unit(samples: Samples) -> Checked:
     """Refuse positions that are not in rad or m, and say what they look like."""
     robot = samples.robot
-    low, high = np.percentile(samples.position, (LOW, HIGH), axis=1)
+    low, high = np.percentile(samples.position, (LOW_PERCENTILE, HIGH_PERCENTILE), axis=1)
     speed = _speed(_unwrapped(samples))
     reach = joint_range(robot)
     beyond = np.maximum(robot.lower - low, high - robot.upper) / reach
@@ -266,7 +266,7 @@ def is_computed(position: Array) -> bool:
     if np.count_nonzero(moving) < MIN_MOVING_SAMPLES:
         return False
     noise = float(np.median(np.abs(np.diff(position, n=DIFFERENCES)[moving]))) / GAIN
-    return noise <= NOTHING * float(np.max(np.abs(position)))
+    return noise <= ROUNDING_SHARE * float(np.max(np.abs(position)))
 
 
 def _speed(samples: Samples) -> Array:
@@ -274,7 +274,7 @@ def _speed(samples: Samples) -> Array:
     rows = min(SPEED_ROWS, samples.count // 4)
     lasting = np.maximum(samples.time[rows:] - samples.time[:-rows], samples.interval)
     speed: Array = np.percentile(
-        np.abs(samples.position[:, rows:] - samples.position[:, :-rows]) / lasting, FAST, axis=1
+        np.abs(samples.position[:, rows:] - samples.position[:, :-rows]) / lasting, FAST_PERCENTILE, axis=1
     )
     return speed
 

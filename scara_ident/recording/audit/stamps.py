@@ -13,19 +13,19 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.manners import several
-from scara_ident.recording.audit.even_clock import ENOUGH, REACH, even_clocks
+from scara_ident.recording.audit.even_clock import MEDIAN_REACH, MIN_SAMPLES, even_clocks
 from scara_ident.recording.audit.samples import GAP_STEPS, Checked, Finding, Samples
 
 # A stamp is off an even clock from this share of the interval on.
 OFF = 0.05
 # The misfit under even times is below this share of that under the stamps: by chance both are as large.
-BETTER = 0.5
+BETTER_RATIO = 0.5
 # A misfit counts up to so many times the usual one: where stamps all but coincide it knows no bounds.
-MOST = 100.0
+MAX_MISFIT = 100.0
 # Fewer rows of moving joints say nothing.
 MIN_ROWS = 5
 # A joint moves where it goes this share of its rms way over five samples.
-MOVING = 0.2
+MOVING_SHARE = 0.2
 # A step below this share of the interval lies within the noise of the clock, and differences over it are noise.
 COINCIDING = 0.1
 
@@ -33,11 +33,11 @@ COINCIDING = 0.1
 def late_stamps(samples: Samples) -> Checked:
     """Take the samples as even where the positions say that only their stamps are not."""
     step = np.diff(samples.time)
-    if samples.count < ENOUGH or np.max(np.abs(step - samples.interval)) <= OFF * samples.interval:
+    if samples.count < MIN_SAMPLES or np.max(np.abs(step - samples.interval)) <= OFF * samples.interval:
         return samples, []
     judged = [(_evener(samples, even), even) for even in even_clocks(samples)]
     share, even = min(judged, key=lambda item: item[0], default=(np.inf, samples.time))
-    if share > BETTER:
+    if share > BETTER_RATIO:
         return samples, []
     off = np.abs(samples.time - even) > OFF * samples.interval
     count, worst = int(np.count_nonzero(off)), float(np.max(np.abs(samples.time - even)))
@@ -78,18 +78,18 @@ def _evener(samples: Samples, even: Array) -> float:
     for position in samples.position[~samples.idle()]:
         # A joint that stands still says nothing.
         way = np.abs(position[4:] - position[:-4])
-        moving = used[way[used] > MOVING * np.sqrt(np.mean(way**2))]
+        moving = used[way[used] > MOVING_SHARE * np.sqrt(np.mean(way**2))]
         if len(moving) < MIN_ROWS:
             continue
         misfits = [_misfit(time, position, moving) for time in (samples.time, even)]
         usual = min(float(np.median(item)) for item in misfits)
         if usual > 0.0:
             for total, item in zip((by_stamp, by_even), misfits, strict=True):
-                total[moving] += np.minimum(item / usual, MOST)
+                total[moving] += np.minimum(item / usual, MAX_MISFIT)
     if not np.any(by_stamp):
         return np.inf
-    stretches = np.arange(0, samples.count, 2 * REACH)
-    if np.any(BETTER * np.add.reduceat(by_even, stretches) > np.add.reduceat(by_stamp, stretches)):
+    stretches = np.arange(0, samples.count, 2 * MEDIAN_REACH)
+    if np.any(BETTER_RATIO * np.add.reduceat(by_even, stretches) > np.add.reduceat(by_stamp, stretches)):
         return np.inf
     return float(np.sum(by_even) / np.sum(by_stamp))
 

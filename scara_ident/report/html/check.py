@@ -23,7 +23,7 @@ from scara_ident.report.html.blocks import (
 from scara_ident.report.html.page import Page, parts
 from scara_ident.report.html.section import NamedSection
 from scara_ident.report.plot import Figure, Layer, Level, Mark, Panel, Plot, single, style, thin_line
-from scara_ident.use.check import CLOSE, Check, limits_of_joint, sentences
+from scara_ident.use.check import CLOSE_STDS, Check, limits_of_joint, sentences
 from scara_ident.use.energy import Energy
 
 # Points of a line, at the most.
@@ -78,7 +78,7 @@ def _limits(found: Check) -> list[Block]:
             [
                 name(each.name),
                 number(each.reached, 4),
-                number(CLOSE * std[each.name], 2) if each.name in std else "",
+                number(CLOSE_STDS * std[each.name], 2) if each.name in std else "",
                 number(each.bound, 4),
                 unit,
                 f"{each.time:.3f}",

@@ -13,7 +13,7 @@ import numpy as np
 from scara_ident.arrays import NORMAL_MEDIAN
 from scara_ident.files import written_together
 from scara_ident.fleet import Fleet
-from scara_ident.fleet.changes import LEVEL
+from scara_ident.fleet.changes import FALSE_CHANGE_LEVEL
 from scara_ident.fleet.fleet import ArmReport
 from scara_ident.manners import several
 from scara_ident.report.html.blocks import (
@@ -64,8 +64,8 @@ def _arms(fleet: Fleet) -> list[Block]:
             ]
         )
     words = (
-        f"An arm is named where a change is more than noise: of the arms named a share of {LEVEL:g} is wrong on average, and of a "
-        f"fleet in which nothing changed a report names any with a chance of {LEVEL:g}. Noise holds what friction, "
+        f"An arm is named where a change is more than noise: of the arms named a share of {FALSE_CHANGE_LEVEL:g} is wrong on average, and of a "
+        f"fleet in which nothing changed a report names any with a chance of {FALSE_CHANGE_LEVEL:g}. Noise holds what friction, "
         "torque scale, offset and delay differ by from date to date, as the whole fleet shows it."
     )
     head = ("arm", "verdict", "what changed", "chance", "diagnosis of the last date", "dates", "last", "faults")

@@ -27,7 +27,7 @@ MAX_FIGURES = 18
 NO_INERTIA = 1e-9
 PER_PAGE = 12
 # Pairs of parameters that are named in words, at the most, and the least size of their correlation.
-MAX_PAIRS, STRONG = 4, 0.9
+MAX_PAIRS, STRONG_CORRELATION = 4, 0.9
 
 
 def parameter_table(estimate: Estimate) -> Table:
@@ -113,7 +113,9 @@ def strongest_pairs(estimate: Estimate) -> list[str]:
     names = estimate.model.names
     pairs = [np.unravel_index(place, correlation.shape) for place in order]
     return [
-        f"{names[i]} and {names[k]} ({correlation[i, k]:+.3f})" for i, k in pairs if abs(correlation[i, k]) >= STRONG
+        f"{names[i]} and {names[k]} ({correlation[i, k]:+.3f})"
+        for i, k in pairs
+        if abs(correlation[i, k]) >= STRONG_CORRELATION
     ]
 
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from scara_ident.diagnosis.candidates.finite_columns import LARGEST, finite_or_zero, is_finite, torque_slope
+from scara_ident.diagnosis.candidates.finite_columns import MAX_COLUMN, finite_or_zero, is_finite, torque_slope
 
 PLAIN = np.array([[1.0, -2.0, 3.0], [0.0, 0.0, 0.0]])
 
 
-@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 2.0 * LARGEST, -1e200])
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 2.0 * MAX_COLUMN, -1e200])
 def test_one_value_that_no_fit_can_take_is_enough(value: float):
     columns = PLAIN.copy()
     assert is_finite(columns)
@@ -26,7 +26,7 @@ def test_what_is_finite_stays_what_it_is_and_nothing_is_finite():
 
 
 def test_products_of_the_largest_and_their_squares_are_finite():
-    largest = np.full(10_000, LARGEST)
+    largest = np.full(10_000, MAX_COLUMN)
     assert np.isfinite((largest @ largest) ** 2)
 
 

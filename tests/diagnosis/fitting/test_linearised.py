@@ -10,7 +10,7 @@ import pytest
 
 from scara_ident.diagnosis.candidates.candidates import Candidate, with_columns
 from scara_ident.diagnosis.fitting.linearised import with_estimate_slopes
-from scara_ident.diagnosis.fitting.trust_region import NEAR
+from scara_ident.diagnosis.fitting.trust_region import RADIUS_TOLERANCE
 from scara_ident.diagnosis.testing.selection_step import SelectionStep
 from scara_ident.effects import Member
 from scara_ident.effects.friction import Stribeck
@@ -173,7 +173,7 @@ def test_a_step_within_a_radius_is_the_best_of_its_length_and_linear_parameters_
     # No room ends so near.
     radius = 0.05 * state.length(way)
     found = state.step(radius)
-    assert state.length(found) == pytest.approx(radius, rel=NEAR)
+    assert state.length(found) == pytest.approx(radius, rel=RADIUS_TOLERANCE)
     # With a multiplier it leaves least.
     change = found[state.linear :]
     slope = beside.T @ (left - beside @ change)

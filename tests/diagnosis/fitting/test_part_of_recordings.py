@@ -10,7 +10,7 @@ import pytest
 
 from scara_ident.diagnosis.candidates.candidates import Candidate
 from scara_ident.diagnosis.fitting.linearised import linearise
-from scara_ident.diagnosis.fitting.part_of_recordings import ENOUGH, _strengths, on_all, on_part
+from scara_ident.diagnosis.fitting.part_of_recordings import ENOUGH_SECONDS, _strengths, on_all, on_part
 from scara_ident.diagnosis.testing.selection_step import SelectionStep
 from scara_ident.effects import Member
 from scara_ident.effects.elasticity import JointElasticity
@@ -32,10 +32,10 @@ def test_no_more_recordings_than_tell_the_effects():
     assert set(names(part)) < set(names(step))
     assert part.chosen == step.chosen
     seconds = 48.0 * np.sum(_strengths(part), axis=1) / np.sum(told, axis=1)
-    assert np.all(seconds > 0.99 * ENOUGH)
+    assert np.all(seconds > 0.99 * ENOUGH_SECONDS)
     # Without the one of them that tells least it would be too little.
     best = np.sort(48.0 * told / np.sum(told, axis=1, keepdims=True), axis=1)[:, ::-1]
-    assert np.min(np.sum(best[:, : len(names(part)) - 1], axis=1)) < ENOUGH
+    assert np.min(np.sum(best[:, : len(names(part)) - 1], axis=1)) < ENOUGH_SECONDS
 
 
 def test_all_recordings_where_fewer_tell_too_little():

@@ -8,7 +8,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import minimize
 
-from scara_ident.diagnosis.fitting.trust_region import NEAR, least_squares, length, within_radius, within_room
+from scara_ident.diagnosis.fitting.trust_region import (
+    RADIUS_TOLERANCE,
+    least_squares,
+    length,
+    within_radius,
+    within_room,
+)
 
 problems = st.integers(0, 2**32 - 1).map(np.random.default_rng)
 
@@ -71,7 +77,7 @@ def test_within_a_radius_it_is_as_long_as_it_may_be_and_leaves_least(rng: np.ran
     if share >= 1.0:
         assert np.array_equal(value, whole)
         return
-    assert length(columns, value) == pytest.approx(radius, rel=2.0 * NEAR)
+    assert length(columns, value) == pytest.approx(radius, rel=2.0 * RADIUS_TOLERANCE)
     # The slope of what is left points along the scaled parameters: no other of this length leaves less.
     size = np.linalg.norm(columns, axis=0)
     slope, own = (columns / size).T @ (target - columns @ value), size * value

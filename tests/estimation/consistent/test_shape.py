@@ -11,7 +11,7 @@ import pytest
 from scara_ident.estimation import ConsistentOptions, consistent, wls
 from scara_ident.estimation.consistent.problem import declared
 from scara_ident.estimation.consistent.shape import (
-    LEVEL,
+    SIGNIFICANCE_LEVEL,
     ShapeChoice,
     block_shares,
     choose_shapes,
@@ -118,7 +118,7 @@ def test_a_joint_whose_data_contradict_the_shape_is_let_go_and_the_others_are_no
     item = observed(MODEL, moving(MODEL.robot), friction(**wrong), 0.05)
     first, second = choices(item)
     assert (first.shape, second.shape) == ("dissipative", "lubricated")
-    assert first.p_value < LEVEL < second.p_value
+    assert first.p_value < SIGNIFICANCE_LEVEL < second.p_value
     assert first.why == "the data contradict the lubricated shape"
     assert consistent(item).shapes == (first, second)
 
