@@ -163,6 +163,8 @@ def find_events(observations: Observations, value: Array, fitted: Observations |
         more = _residuals(fitted, value)
         parts, left = [*parts, *more[0]], [*left, *more[1]]
         owner += [len(data.recordings) + k for k in more[2]]
+    if not parts:
+        return ()
     noise = bounded_noise(parts, left, owner)
     stretches = [binned(k, part, row, noise[k]) for k, part, row in zip(owner, parts, left, strict=True)]
 

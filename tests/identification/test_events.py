@@ -178,3 +178,12 @@ def test_an_arm_of_a_single_joint_has_events_too(tmp_path: Path):
     (event,) = find_events(observations, robust_fit(observations).value)
     assert (event.recording, event.joints) == ("swing0", ("joint1",))
     assert event.start == pytest.approx(START, abs=0.15)
+
+
+def test_of_recordings_shorter_than_two_bins_there_is_none():
+    whole = swing(ROBOT, "short", seed=1, seconds=2.0, rate=1000.0)
+    short = replace(
+        whole, time=whole.time[900:970], position=whole.position[:, 900:970], effort=whole.effort[:, 900:970]
+    )
+    observations = observe(build_model(ROBOT, "basic"), prepare([short], (None, None)))
+    assert find_events(observations, robust_fit(observations).value) == ()
