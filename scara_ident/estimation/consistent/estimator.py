@@ -255,7 +255,7 @@ def _beyond_constraints(covariance: Array, plain: Array, apart: float) -> Array:
     beyond = np.sqrt(apart)
     tail = float(np.exp(-0.5 * apart - log_ndtr(-beyond)) / np.sqrt(2.0 * np.pi))
     share = float(np.clip(1.0 + apart - beyond * tail, 0.0, 1.0))
-    known = np.isfinite(np.diag(plain))
+    known = np.isfinite(np.diag(plain)) & np.isfinite(np.diag(covariance))
     found = covariance.copy()
     own = np.ix_(known, known)
     found[own] += share * (plain[own] - covariance[own])

@@ -292,3 +292,10 @@ def test_what_both_leave_open_stays_open():
     plain, along = np.diag([2.0, np.inf]), np.diag([1.0, np.inf])
     found = _beyond_constraints(along, plain, 0.0)
     assert found[0, 0] == pytest.approx(2.0) and found[1, 1] == np.inf
+
+
+def test_what_constraints_leave_open_stays_open():
+    """One stretch of time told nothing of how far another would differ, along the constraints that held: infinity less infinity."""
+    plain, along = np.diag([2.0, 3.0]), np.diag([np.inf, 0.0])
+    found = _beyond_constraints(along, plain, 0.0)
+    assert found[0, 0] == np.inf and found[1, 1] == pytest.approx(3.0)
