@@ -24,6 +24,8 @@ MAX_INTERVAL, MIN_INTERVAL = 0.2, 1e-5
 CLOCKS = (("milliseconds", 1e3), ("microseconds", 1e6), ("nanoseconds", 1e9))
 # A robot is usually logged near 500 Hz; of two readings of a clock, the one nearer to this is meant.
 USUAL_INTERVAL = 2e-3
+# Beyond this share of steps back rows are in no order, and their steps tell no unit.
+BACK_SHARE = 0.1
 # Beyond this share the clock is too coarse, and what is kept would depend on which row came first.
 REPEATED_SHARE = 0.05
 # On a clock whose steps up to LATE_STEPS vary by less than STEADY_SHARE, a step within WHOLE_STEP_TOLERANCE (three times that variation, if it is
@@ -73,6 +75,9 @@ def missing_numbers(samples: Samples) -> Checked:
 def clock_unit(samples: Samples) -> Checked:
     """Refuse a time that stands still or does not count seconds."""
     step = np.diff(samples.time)
+    if np.mean(step < 0) > BACK_SHARE:
+        # Said by `time_order`.
+        return samples, []
     step = step[step > 0]
     if not len(step):
         samples.refuse("time never advances; it must be in seconds and grow from row to row")

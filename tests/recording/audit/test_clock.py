@@ -112,6 +112,15 @@ def test_time_that_runs_backwards_is_refused_by_row(read):
     assert "1 time in all" in message
 
 
+def test_rows_in_no_order_are_refused_for_that_and_not_for_their_unit(read):
+    """The steps forward of shuffled rows are so long that time was taken for milliseconds."""
+    made = columns()
+    for order in (np.random.default_rng(0).permutation(4000), np.arange(4000)[::-1]):
+        message = refusal(read, rows(made, order))
+        assert "time runs backwards at row" in message
+        assert "sort the rows by time" in message
+
+
 def test_rows_written_twice_are_dropped(read):
     made = columns()
     twice = rows(made, np.sort(np.concatenate([np.arange(4000), np.arange(4000)])))
