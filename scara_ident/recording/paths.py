@@ -19,8 +19,9 @@ def recording_name(path: Path) -> str:
     return real_path(path).name if path.is_dir() else path.stem
 
 
-def recording_paths(words: Sequence[Path | str]) -> tuple[Path, ...]:
+def recording_paths(words: Path | str | Sequence[Path | str]) -> tuple[Path, ...]:
     """List the files that words on a command line stand for (see `read_recordings`)."""
+    words = (words,) if isinstance(words, (Path, str)) else words
     found: dict[Path, Path] = {}
     stems: dict[tuple[Path, str], Path] = {}
     for word in words:

@@ -328,12 +328,14 @@ def recording_of(
     )
 
 
-def read_recordings(words: Sequence[Path | str], robot: Robot, *, need_effort: bool = True) -> tuple[Recording, ...]:
+def read_recordings(
+    words: Path | str | Sequence[Path | str], robot: Robot, *, need_effort: bool = True
+) -> tuple[Recording, ...]:
     """Read files, folders of recordings and globs.
 
     Parameters
     ----------
-    words : sequence of path or str
+    words : path or str, or a sequence of these
         Each a file, a folder (its recordings in natural order, not those of its folders; the folder of a rosbag2
         recording is one recording) or a glob.
     robot : Robot

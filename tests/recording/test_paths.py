@@ -45,6 +45,7 @@ def test_words_are_files_folders_and_globs_in_order_of_appearance_and_once(tmp_p
     ]
     assert names("**/F_1.parquet") == ["F_1"]
     assert names() == []
+    assert recording_paths("OJD_*") == recording_paths(["OJD_*"])
 
 
 def test_a_file_with_the_signs_of_a_glob_in_its_name_is_that_file(robot, tmp_path):
