@@ -23,6 +23,7 @@ PARTS = (
     "identify",
     "compare",
     "diagnose",
+    "ask",
     "use",
     "export",
     "arms",
@@ -38,7 +39,8 @@ def demo(
     output: options.Folder = Path("demo-output"),
     seed: Annotated[int, typer.Option(min=0, help="Of noise and random starts.")] = 1,
 ) -> None:
-    """Run the whole story on the embedded arm: design, record, identify, compare, diagnose, use, export, and a fleet."""
+    """Run the whole story on the embedded arm: design, record, identify, compare, diagnose, ask, use, export, and a fleet."""
+    from scara_ident.cli.ask import ask
     from scara_ident.cli.base import base
     from scara_ident.cli.compare import compare
     from scara_ident.cli.diagnose import diagnose
@@ -81,6 +83,9 @@ def demo(
     found = output / "diagnose" / "diagnosis.json"
     diagnose([str(train)], validate=[str(test)], output=found.parent)
     console.print(f"The arm really had {HIDDEN}: see {train / 'OJD_1.truth.json'}.", soft_wrap=True)
+    chapter("What to record next, had but one motion been recorded")
+    simulate(["CI"], effect=[HIDDEN], seed=seed, repetitions=2, output=output / "ask" / "recordings")
+    ask(output / "ask", duration=8.0, starts=1, seed=seed)
     chapter("What the model wins, fed forward and in simulation")
     use(found, recording=[str(test)], output=output / "use")
     chapter("The arm as it was found, for a controller: one C header")

@@ -20,12 +20,18 @@ def test_the_demo_writes_every_result_and_finds_what_it_hid(command, tmp_path: P
         "train/trajectory_1.parquet", "train/OJD_2.parquet", "test/L1_1.parquet",
         "identify/identification.json", "identify/report.html", "identify/scara03_identified.urdf",
         "compare/comparison.json", "compare/report.html", "diagnose/diagnosis.json", "diagnose/report.html",
+        "ask/recordings/CI_2.parquet", "ask/diagnosis.json", "ask/report.html",
+        "ask/next/trajectory.csv", "ask/next/excitation.json",
         "use/use.json", "use/report.html", "export/scara03.h", "export/export.json",
         "arms/arm2/2026-03-08/OJD_1.parquet", "fleet/fleet.parquet", "fleet/report.html",
     }  # fmt: skip
     diagnosis = json.loads((tmp_path / "demo" / "diagnose" / "diagnosis.json").read_text())
     (effect,) = diagnosis["effects"]
     assert (diagnosis["verdict"], effect["effect"], effect["joint"]) == ("explained", "transmission_loss", "joint2")
+    # From one motion alone the arm is asked for what tells it.
+    told, *_ = json.loads((tmp_path / "demo" / "ask" / "next" / "excitation.json").read_text())["tells"]
+    assert told["question"].startswith("transmission_loss of joint2")
+    assert told["sigma_after"] > 3.0 * told["sigma_before"]
     # It tells the truth in the end, and what to look at.
     story = answer.out.splitlines()
     (truth,) = [line for line in story if line.startswith("The arm really had")]
