@@ -126,7 +126,10 @@ def weakest_direction(rows: Sequence[Array] | Array, directions: int) -> float:
     is.
     """
     singular = [np.linalg.svd(row, compute_uv=False) for row in rows]
-    return float(np.median([each[directions - 1] / each[0] if directions <= len(each) else 0.0 for each in singular]))
+    # An arm whose tool is on its only axis feels none.
+    felt = [0 < directions <= len(each) and each[0] > 0.0 for each in singular]
+    shares = [each[directions - 1] / each[0] if some else 0.0 for each, some in zip(singular, felt, strict=True)]
+    return float(np.median(shares))
 
 
 def farthest_point(robot: Robot) -> Array:

@@ -23,7 +23,7 @@ from scara_ident.robot.kinematics import (
     weakest_direction,
 )
 from scara_ident.robot.robot import load_robot
-from tests.arms import example_urdf
+from tests.arms import Link, example_urdf, write_urdf
 from tests.simulation.made import tree
 
 
@@ -125,3 +125,11 @@ def test_directions_that_an_arm_feels_and_what_it_feels_of_them_at_once():
     assert weakest_direction(bent, 2) > 0.2
     assert weakest_direction(stretched, 2) < 1e-3
     assert weakest_direction(bent, 3) == 0.0
+
+
+def test_an_arm_whose_tool_is_on_its_only_axis_feels_no_force(tmp_path: Path):
+    """It ended in a warning of NumPy, 0 over 0, on the terminal of ``contact``."""
+    arm = load_robot(write_urdf(tmp_path / "wheel.urdf", [Link(axis=(0.0, 1.0, 0.0))]))
+    rows = list(force_torques(arm, np.zeros((3, 1))))
+    assert felt_directions(arm, np.zeros((3, 1))) == 0
+    assert weakest_direction(rows, 0) == weakest_direction(rows, 1) == 0.0
