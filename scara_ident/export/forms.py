@@ -167,7 +167,8 @@ def _unsaid(form: Form, found: IdentifiedModel) -> Iterator[tuple[Term, list[int
     """Give terms with the places of their columns that the format lacks, and why."""
     for term in found.model.terms:
         columns = list(range(len(term.columns)))
-        if isinstance(term, RigidBody):
+        # Of an axis that lifts its links wherever the arm is, its weight takes up the offset.
+        if isinstance(term, RigidBody) or not columns:
             continue
         if isinstance(term, Friction):
             lacking = [k for k in columns if not _has(form, term.powers[k % len(term.powers)])]

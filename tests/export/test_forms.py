@@ -14,6 +14,8 @@ from scara_ident.errors import EstimationError
 from scara_ident.estimation.information import Information
 from scara_ident.export.forms import FORMS, Form, friction_said, offset_said, possible_standard, said_by, with_code
 from scara_ident.model.terms import Friction, Offset, RigidBody
+from scara_ident.robot.robot import load_robot
+from tests.arms import Link, write_urdf
 from tests.export.arms import scara
 from tests.export.identified import identified
 
@@ -72,6 +74,14 @@ def test_what_is_missing_is_named_with_why(tmp_path: Path):
     }
     names = dict(said_by(FORMS["urdf"], found, found.standard).missing)
     assert {"armature", "a21, a31, a22, a32", "p_o1, p_o2", "spring of joint2"} < set(names)
+
+
+def test_of_a_lift_whose_weight_takes_up_the_offset_no_offset_is_missing(tmp_path: Path):
+    """It has no column: to write the URDF ended in an internal error, of `identify` too."""
+    lift = load_robot(write_urdf(tmp_path / "lift.urdf", [Link(kind="prismatic")]))
+    found = identified(lift, samples=60)
+    assert found.standard is not None
+    assert [what for what, _ in said_by(FORMS["urdf"], found, found.standard).missing] == ["armature", "a21, a31"]
 
 
 def test_friction_does_not_stand_in_for_what_was_carried_at_times(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
