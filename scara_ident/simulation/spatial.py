@@ -258,7 +258,7 @@ def check_against_pinocchio(model: pin.Model, bodies: Array, *, states: int = 3)
     Raises
     ------
     RobotError
-        If it exceeds `TOLERANCE`.
+        If it exceeds `TOLERANCE`, or nothing that moves has mass or inertia.
     """
     data = model.createData()
     floating = pin.Model(model)
@@ -274,6 +274,10 @@ def check_against_pinocchio(model: pin.Model, bodies: Array, *, states: int = 3)
         torque = torque_by_regressor(model, data, bodies, full, v, rest)
         # Bias torques may cancel to zero; the size of what cancels is the inertia at these speeds.
         size = np.abs(expected).max()
+        if size == 0.0:
+            raise RobotError(
+                f"{model.name}: no joint moves a link with mass or inertia; give the links <inertial> in the URDF"
+            )
         worst = np.maximum(worst, np.abs(mass - expected).max() / size)
         worst = np.maximum(worst, np.abs(bias - torque).max() / max(size, np.abs(torque).max()))
     if not worst <= TOLERANCE:

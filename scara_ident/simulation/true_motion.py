@@ -150,7 +150,10 @@ def needed_substeps(arm: VirtualArm, draft: PlantDraft, rate: float) -> int:
     rotor = arrays["armature"]
     stiffness = np.where(arrays["elastic"] > 0.0, arrays["stiffness"], 0.0)
     # Inertial coupling makes a link lighter than its diagonal entry; 4 covers the arms at hand.
-    square = np.divide(stiffness, rotor, out=np.zeros(draft.n), where=stiffness > 0.0) + 4.0 * stiffness / link
+    square = np.divide(stiffness, rotor, out=np.zeros(draft.n), where=stiffness > 0.0)
+    with np.errstate(divide="ignore"):
+        # A link without mass swings on a spring without end; without a spring it is none of its own.
+        square += np.divide(4.0 * stiffness, link, out=np.zeros(draft.n), where=stiffness > 0.0)
     dry = arrays["friction"][:, 0] + arrays["stribeck_amplitude"]
     sliding = arrays["presliding"]
     square += np.divide(4.0 * dry, sliding * (link + rotor), out=np.zeros(draft.n), where=sliding > 0.0)

@@ -68,3 +68,10 @@ def test_a_body_that_cannot_exist_may_be_part_of_a_model(mass: float) -> None:
     bodies = random_bodies(6, robot.n)
     bodies[2] = [mass, 2.0, -3.0, 1.0, -0.1, 0.0, 0.2, 0.0, 0.0, 0.3]
     assert check_against_pinocchio(robot.model, bodies) <= TOLERANCE
+
+
+def test_links_without_mass_are_refused_with_what_to_do() -> None:
+    """A URDF without any <inertial>: 0 over 0 was said to differ from Pinocchio by nan."""
+    robot = load_robot(example_urdf("ur5_robot.urdf"))
+    with pytest.raises(RobotError, match="no joint moves a link with mass or inertia; give the links <inertial>"):
+        check_against_pinocchio(robot.model, np.zeros((robot.n, 10)))

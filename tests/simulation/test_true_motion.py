@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from scara_ident.errors import LostArm, UsageError
-from scara_ident.simulation import VirtualArm, parse_effect, simulate
+from scara_ident.robot.robot import load_robot
+from scara_ident.simulation import VirtualArm, parse_effect, simulate, virtual_arm
 from scara_ident.simulation.plant import PlantDraft
 from scara_ident.simulation.true_motion import MAX_SUBSTEPS, needed_substeps
+from tests.arms import Link, write_urdf
 from tests.simulation.made import bare, rigid, scara, swing
 
 
@@ -57,3 +60,11 @@ def test_an_arm_that_its_controller_loses_says_when() -> None:
     wild = replace(arm, controller=replace(arm.controller, proportional=-100.0 * arm.controller.proportional))
     with pytest.raises(LostArm, match=r"^swing on scara03: the arm got out of control at \d"):
         simulate(wild, swing(arm.robot, 1.0))
+
+
+def test_a_link_without_mass_moves_with_its_rotor(tmp_path: Path) -> None:
+    """A flange without <inertial> on a joint of its own ended in an internal error: 0 over 0 steps."""
+    bare_link = Link(axis=(0.0, 1.0, 0.0), xyz=(0.4, 0.0, 0.0), mass=0.0, com=(0.0, 0.0, 0.0), inertia=(0.0, 0.0, 0.0))
+    arm = virtual_arm(load_robot(write_urdf(tmp_path / "flange.urdf", [Link(), bare_link])))
+    assert arm.link_inertia()[1] == 0.0
+    assert needed_substeps(arm, arm.draft(), 1000.0) < MAX_SUBSTEPS
