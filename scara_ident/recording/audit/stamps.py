@@ -22,6 +22,8 @@ OFF = 0.05
 BETTER_RATIO = 0.5
 # A misfit counts up to so many times the usual one: where stamps all but coincide it knows no bounds.
 MAX_MISFIT = 100.0
+# Even times are refused for a stretch in which the stamps fit better with less chance than this over all stretches.
+MAX_CHANCE = 0.01
 # Fewer rows of moving joints say nothing.
 MIN_ROWS = 5
 # A joint moves where it goes this share of its rms way over five samples.
@@ -88,10 +90,27 @@ def _evener(samples: Samples, even: Array) -> float:
                 total[moving] += np.minimum(item / usual, MAX_MISFIT)
     if not np.any(by_stamp):
         return np.inf
-    stretches = np.arange(0, samples.count, 2 * MEDIAN_REACH)
-    if np.any(BETTER_RATIO * np.add.reduceat(by_even, stretches) > np.add.reduceat(by_stamp, stretches)):
+    if _stamped_somewhere(by_stamp, by_even, off):
         return np.inf
     return float(np.sum(by_even) / np.sum(by_stamp))
+
+
+def _stamped_somewhere(by_stamp: Array, by_even: Array, off: NDArray[np.bool_]) -> bool:
+    """Return whether the stamps fit better than even times in a stretch, and by more than chance makes in one of so many.
+
+    All misfits about a stamp are of one error of its time, so that a stretch has as many degrees of freedom as stamps that
+    are off.
+    """
+    stretches = np.arange(0, len(off), 2 * MEDIAN_REACH)
+    stamp, even, count = (np.add.reduceat(item, stretches) for item in (by_stamp, by_even, off.astype(float)))
+    better = np.flatnonzero((BETTER_RATIO * even > stamp) & (count > 0.0))
+    if not len(better):
+        return False
+    from scipy.special import fdtrc
+
+    ratio = even[better] / np.maximum(stamp[better], np.finfo(float).tiny)
+    chance = fdtrc(count[better], count[better], ratio) * np.count_nonzero(count)
+    return bool(np.min(chance) < MAX_CHANCE)
 
 
 def _misfit(time: Array, position: Array, used: NDArray[np.intp]) -> Array:
