@@ -28,7 +28,7 @@ ROOMS = (
 WITHIN = {
     "diagnosis": (
         "criteria", "work", "candidates", "testing", "fitting", "checks", "selection", "evidence", "held_out",
-        "whole_estimate", "proxies", "model_selection", "found_effect", "braking_evidence", "verdict", "diagnose",
+        "whole_estimate", "proxies", "model_selection", "found_effect", "braking_evidence", "possible_evidence", "verdict", "diagnose",
     ),
 }  # fmt: skip
 LARGEST, MEDIAN = 400, 145

@@ -17,6 +17,7 @@ from scara_ident.diagnosis.evidence.steady_evidence import steady_evidence
 from scara_ident.diagnosis.found_effect import FoundEffect
 from scara_ident.diagnosis.held_out.gain import spoken_against
 from scara_ident.diagnosis.held_out.validation import Validation
+from scara_ident.diagnosis.possible_evidence import possible_evidence
 from scara_ident.diagnosis.selection.audit import left_open
 from scara_ident.estimation.noise_bias import noise_signals
 from scara_ident.estimation.run_offsets import rms_of
@@ -35,7 +36,8 @@ def weighed_evidence(
 
     Every witness that may speak against it is asked in turn, and the first that does is the one that is reported: what the search
     left open, what is left of the training recordings, lines in it, one of them beside all others, its parts beside each other,
-    what comes late in all, those held out, and there each effect. Friction that pushes is reported whatever they say.
+    what comes late in all, those held out, and there each effect. Friction that pushes, and a body or rotor
+    that is less than nothing, is reported whatever they say.
 
     Parameters
     ----------
@@ -56,7 +58,8 @@ def weighed_evidence(
     shown = held_out_evidence(shown, training, others, held_out.unsure, held_out.apart, criteria)
     gains = {item.label: item.held_out for item in effects if item.held_out is not None}
     shown = spoken_against(shown, gains, criteria)
-    return braking_evidence(shown, after, outcome.training, effects)
+    shown = braking_evidence(shown, after, outcome.training, effects)
+    return possible_evidence(shown, after, effects)
 
 
 def verdict_of(outcome: Outcome, effects: Sequence[FoundEffect], shown: Sequence[Evidence]) -> Verdict:
