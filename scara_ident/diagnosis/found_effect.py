@@ -150,6 +150,12 @@ def found_effects(
             beside = replace(scene, value=decision.examination.model_value[: len(scene.value)])
             coefficients = parameters.coefficients[place].value
             otherwise = candidate.effect.or_else(beside, candidate.member, coefficients)
+            others = [
+                (item.effect, item.member, parameters.coefficients[k].value)
+                for k, item in enumerate(found.chosen)
+                if k != place
+            ]
+            otherwise += candidate.effect.or_else_beside(candidate.member, coefficients, others)
             if may_be_setpoints(found.data, candidate.effect, candidate.member):
                 otherwise += OR_ELSE
         results.append(

@@ -147,10 +147,8 @@ class Effect(ABC):
                     f"effect {self.name}: column {k} has shape {column.shape}; expected {shapes[0]} for the member's joint or "
                     f"{shapes[1]} for all joints"
                 )
-        return {
-            joint: [column if column.ndim == 1 else column[joint] for column in columns]
-            for joint in self.rows(signals.scene, member)
-        }
+        joints = self.rows(signals.scene, member)
+        return {j: [column if column.ndim == 1 else column[j] for column in columns] for j in joints}
 
     def fill(self, signals: Signals, member: Member, rows: Sequence[Array]) -> None:
         """Write the columns into those of each joint: (k, N) where they act, (0, N) where they do not."""
@@ -185,10 +183,8 @@ class Effect(ABC):
     def scan(self, scene: Scene, joint: int) -> Iterable[tuple[float, ...]]:
         """Return the values of the nonlinear parameters that are tried on a joint."""
         spaced = [np.geomspace if item.logarithmic else np.linspace for item in self.nonlinear]
-        grids = [
-            grid(item.lower, item.upper, SCAN_POINTS + 2)[1:-1]
-            for grid, item in zip(spaced, self.nonlinear, strict=True)
-        ]
+        pairs = zip(spaced, self.nonlinear, strict=True)
+        grids = [grid(item.lower, item.upper, SCAN_POINTS + 2)[1:-1] for grid, item in pairs]
         return (tuple(float(x) for x in values) for values in product(*grids))
 
     def limits(self, scene: Scene, member: Member) -> tuple[tuple[float, float], ...]:
@@ -263,6 +259,10 @@ class Effect(ABC):
 
     def or_else(self, scene: Scene, member: Member, value: Array) -> str:
         """Say after the description what else an effect of these coefficients may be, by the model's parameters with it; or ""."""
+        return ""
+
+    def or_else_beside(self, member: Member, value: Array, others: Sequence[tuple[Effect, Member, Array]]) -> str:
+        """Say what else it may be together with another found: families, members and coefficients of these are given; or ""."""
         return ""
 
     def gap(self, scene: Scene, member: Member) -> tuple[float, ...]:

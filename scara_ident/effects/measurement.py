@@ -148,6 +148,17 @@ class TorqueGainMismatch(Effect):
             else "; of two joints nothing tells which one's is wrong"
         )
 
+    def or_else_beside(self, member: Member, value: Array, others: Sequence[tuple[Effect, Member, Array]]) -> str:
+        """Name a gear that loses another share where it is driven: such a scale beside a share that is lost either way is one."""
+        for effect, other, size in others:
+            if effect.geared_joint(other) != member.joint:
+                continue
+            passed = [effect.passes_on(other, size, driving) for driving in (1.0, -1.0)]
+            drives, driven = ((1.0 + float(value[0])) / share - 1.0 if share else 0.0 for share in passed)
+            if drives > 0.0 > driven:
+                return f"; or the gear loses {drives:.1%} of the torque where it drives and {-driven:.1%} where it is driven"
+        return ""
+
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
         """Return the predicted torque."""
         return [signals.predicted[member.place]]

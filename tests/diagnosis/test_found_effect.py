@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from scara_ident.arrays import Array
 from scara_ident.diagnosis import diagnose
 from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.fitting.effect_parameters import physical_parameters
 from scara_ident.diagnosis.found_effect import found_effects, not_found
-from scara_ident.effects import Parameter, effects_named
+from scara_ident.effects import Effect, Member, Parameter, effects_named
 from scara_ident.effects.measurement import shifted
 from scara_ident.effects.position import Spring
 from scara_ident.inquiry.next_steps import next_steps
@@ -61,6 +62,21 @@ class Reciprocal(Spring):
 def test_an_effect_says_as_what_its_parameters_are_told() -> None:
     (found,) = diagnose(load_robot(), virtual_runs("spring:joint1"), bands=BANDS, catalogue=(Reciprocal(),)).effects
     assert found.parameters["stiffness"].symmetric_power == -1.0
+
+
+class Beside(Spring):
+    """A spring that says what was found beside it."""
+
+    def or_else_beside(self, member: Member, value: Array, others: Sequence[tuple[Effect, Member, Array]]) -> str:
+        return "; beside " + ", ".join(f"{effect.name} of {len(size)}" for effect, _, size in others)
+
+
+@pytest.mark.slow
+def test_an_effect_says_what_else_it_may_be_together_with_another() -> None:
+    runs = virtual_runs("spring:joint1", "asymmetric_friction:joint2")
+    catalogue = (Beside(), *effects_named("asymmetric_friction"))
+    found = {item.effect: item for item in diagnose(load_robot(), runs, bands=BANDS, catalogue=catalogue).effects}
+    assert found["spring"].description.endswith("; beside asymmetric_friction of 1")
 
 
 def test_what_a_second_encoder_tells_of_an_effect_that_was_not_added_is_said() -> None:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from scara_ident.effects import Member, Signals
+from scara_ident.effects.gear import TransmissionLoss
 from scara_ident.effects.measurement import (
     BentTorqueSensor,
     TimeDelay,
@@ -69,6 +70,19 @@ def test_of_more_than_two_joints_the_first_may_have_the_wrong_scale_too():
     assert effect.description(scene, Member(4)) == "a torque scale of its own, given over the first joint's"
     assert effect.or_else(scene, Member(4), np.array([0.1])) == ""
     assert "nothing tells which" in effect.or_else(scene_of(load_robot()), Member(1), np.array([0.1]))
+
+
+@pytest.mark.parametrize(("ratio", "said"), [(0.96, True), (1.04, True), (1.2, False), (0.8, False)])
+def test_beside_a_gear_that_loses_it_may_be_that_this_loses_more_one_way(ratio: float, said: bool):
+    """A gear that lost 19 % where it was driven and 11 % where it drove was a loss of 15 % and a torque scale, and nothing else was said."""
+    effect, value = TorqueGainMismatch(), np.array([ratio - 1.0])
+    lost = TransmissionLoss(1), Member(3, (0.15,)), np.array([0.15])
+    words = effect.or_else_beside(Member(3), value, [lost])
+    # Motor over load is ratio (1 + c) where it drives and ratio (1 - c) where it is driven; a gear that gives energy is none.
+    drives, driven = ratio * 1.15 - 1.0, 1.0 - ratio * 0.85
+    assert (f"loses {drives:.1%} of the torque where it drives and {driven:.1%} where it is driven" in words) is said
+    assert (words == "") is not said
+    assert effect.or_else_beside(Member(2), value, [lost]) == effect.or_else_beside(Member(3), value, []) == ""
 
 
 def test_the_ratio_is_to_the_first_joint_with_what_both_scales_are_uncertain_by():
