@@ -96,6 +96,7 @@ def _steps(diagnosis: Diagnosis) -> tuple[NextStep, ...]:
     steps = (
         *motions[: len(urgent)],
         *_remainder(diagnosis, urgent),
+        *_apart(diagnosis),
         *_recordings(diagnosis),
         *motions[len(urgent) :],
         *_confirmations(diagnosis),
@@ -124,6 +125,29 @@ def _remainder(diagnosis: Diagnosis, asked: Sequence[Question]) -> Iterator[Next
         joints = [item.joint for item in diagnosis.evidence if not item.shown and item.by == "repetition"]
     if joints:
         yield NextStep(f"what is left on {' and '.join(joints)}", HALF_THE_SPEED, 2.0 * diagnosis.search.scene.duration)
+
+
+def _apart(diagnosis: Diagnosis) -> Iterator[NextStep]:
+    """Ask for a recording that leaves more than all others once more, unless a repetition of its motion is there already."""
+    training = diagnosis.training_after
+    names, motions = [item.name for item in training.each], list(training.data.labels)
+    joints: dict[str, list[str]] = {}
+    for item in diagnosis.evidence:
+        if item.apart in names:
+            joints.setdefault(item.apart, []).append(item.joint)
+    for name, own in joints.items():
+        place = names.index(name)
+        length = sum(part.samples / part.rate for part in training.data.stretches if part.name == name)
+        again = (
+            f"record its motion again: where it is gone, something was different in {name}, which is then to be left out",
+            length,
+        )
+        there = (
+            f"its motion was recorded without it too: find what was different in {name}, or leave it out",
+            None,
+        )
+        motion, seconds = there if motions.count(motions[place]) > 1 else again
+        yield NextStep(f"what {name} alone has on {' and '.join(own)}", motion, seconds)
 
 
 def _recordings(diagnosis: Diagnosis) -> Iterator[NextStep]:

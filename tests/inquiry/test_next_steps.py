@@ -38,6 +38,18 @@ def test_what_the_recordings_lack_is_asked_for(lean):
     assert found["whether the result holds elsewhere"].motion.endswith("give it with --validate")
 
 
+@pytest.mark.parametrize("repeated", [False, True])
+def test_a_recording_that_leaves_more_than_all_others_is_asked_for_once_more(repeated: bool):
+    """A brake that dragged in one run was `undecided`, and another motion over the whole workspace the first thing to do."""
+    runs = exact_runs()[:: 1 if repeated else 2]
+    found, run = diagnose(load_robot(), runs, bands=BANDS, catalogue=()), runs[-1]
+    evidence = (found.evidence[0], replace(found.evidence[1], shown=False, by="", apart=run.name))
+    first = next_steps(replace(found, evidence=evidence))[0]
+    assert first.question == f"what {run.name} alone has on joint2"
+    assert ("find what was different" in first.motion, first.seconds is None) == (repeated, repeated)
+    assert first.seconds is None or first.seconds == pytest.approx(np.ptp(run.time), rel=0.01)
+
+
 def test_they_are_found_once_for_the_file_the_report_and_the_story(monkeypatch):
     found = open_diagnosis()
     asked = []

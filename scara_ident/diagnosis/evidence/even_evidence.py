@@ -57,8 +57,9 @@ def even_evidence(
             own = after.variation.joints[j] if after.variation is not None else None
             differing = own is not None and _as_runs_differ(own, training.joints[j], after.value, left, criteria)
             if not differing:
-                why = f"{training.each[place].name} leaves {ratio:.2g} times the error of all others"
-                item = replace(item, shown=False, by="", why=why)
+                name = training.each[place].name
+                why = f"{name} leaves {ratio:.2g} times the error of all others"
+                item = replace(item, shown=False, by="", why=why, apart=name)
         found.append(item)
     return tuple(found)
 

@@ -53,6 +53,8 @@ class Evidence:
         tried.
     lacks : bool
         Whether the model surely lacks something there: more repeats than filters and encoders may leave.
+    apart : str
+        The recording that leaves more than all others; empty where none does.
     """
 
     joint: str
@@ -61,6 +63,7 @@ class Evidence:
     why: str
     limit: float
     lacks: bool = False
+    apart: str = ""
 
 
 def evidence(

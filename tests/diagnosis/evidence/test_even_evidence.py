@@ -36,6 +36,7 @@ def test_what_one_recording_leaves_more_of_than_all_others_is_no_noise():
     assert (
         not second.shown and second.why.startswith(f"{name} leaves ") and "times the error of all others" in second.why
     )
+    assert second.apart == name
     # Of a single recording nothing is said.
     assert even_evidence(SHOWN, after, louder.of([2])) == SHOWN
 
