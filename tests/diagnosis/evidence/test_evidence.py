@@ -166,6 +166,8 @@ def test_what_surely_repeats_is_no_noise_however_small_beside_it(nothing_missing
     assert [item.shown for item in found] == [shown, shown]
     said = "0.009 N m repeats from run to run (p = 1.3e-14) beside 0.0103 N m that does not: more than filters"
     assert found[0].why.startswith(said) != shown
+    # Twenty times the noise was "too little to tell what it is".
+    assert found[0].why.endswith("and no effect that was tried tells what it is") != shown
     # Then the model lacks something, whatever it is.
     assert [item.lacks for item in found] == [not shown, not shown]
 
