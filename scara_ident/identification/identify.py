@@ -22,6 +22,7 @@ from scara_ident.estimation.information import Information, merge
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.estimation.robust import disagreement, robust_fit
 from scara_ident.estimation.run_offsets import beside_offsets, offsets_on
+from scara_ident.estimation.urdf_scale import urdf_scale
 from scara_ident.files import real_path
 from scara_ident.identification import ESTIMATORS
 from scara_ident.identification.arguments import Recordings, model_of, recordings_of
@@ -33,6 +34,7 @@ from scara_ident.identification.long_recordings import with_all_samples
 from scara_ident.identification.recording_check import held_out_events
 from scara_ident.identification.usable import check_rows, usable_in_bands
 from scara_ident.manners import Saved, several
+from scara_ident.model.base_parameters import parameter_scale
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.position_noise import noise_sizes
 from scara_ident.motion.repeatability import repeatability
@@ -348,6 +350,23 @@ def undetermined(identification: Identification) -> list[str]:
     """Return the names of the parameters that the data leave open."""
     estimate = identification.estimate
     return [name for name, open_ in zip(estimate.model.names, estimate.undetermined, strict=True) if open_]
+
+
+def determined_in_sums(identification: Identification) -> list[str]:
+    """Return the names of determined parameters of bodies that are less sure than all bodies of the description are large.
+
+    They hardly differ from sums of others, as where an angle of the description has few digits: the torque tells them together.
+    Where efforts are in units of their own, bodies are as many times larger.
+    """
+    estimate, robot, term = identification.estimate, identification.model.robot, identification.model.rigid_body
+    mass = float(np.sum(robot.standard_parameters()[: 10 * robot.n : 10]))
+    if mass <= 0.0:
+        return []
+    mass *= max([1.0, *map(abs, urdf_scale(estimate, identification.training).values())])
+    place = identification.model.place(term)
+    unsure = estimate.std[place] > mass * parameter_scale(robot)[term.base.kept[term.kept]]
+    unsure &= ~estimate.undetermined[place] & np.isfinite(estimate.std[place])
+    return [column.name for column, beyond in zip(term.columns, unsure, strict=True) if beyond]
 
 
 def insignificant_parameters(identification: Identification) -> list[str]:

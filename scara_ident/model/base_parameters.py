@@ -174,7 +174,7 @@ def find_base_parameters(robot: Robot, *, rotor_inertia: bool = True, seed: int 
     names += [f"Ia{i + 1}" for i in range(n)]
     units = list(BODY_UNITS) * n + [robot.armature_unit(i) for i in range(n)]
 
-    scale = _parameter_scale(robot)
+    scale = parameter_scale(robot)
     # Lengths of columns and what they share are those of the triangular factor, which has p rows.
     columns = np.asarray(np.linalg.qr(_random_columns(robot, seed) * scale, mode="r"))
     size = np.linalg.norm(columns, axis=0)
@@ -251,7 +251,7 @@ def size_of(robot: Robot) -> float:
     return total if total > 0.0 else 1.0
 
 
-def _parameter_scale(robot: Robot) -> Array:
+def parameter_scale(robot: Robot) -> Array:
     """Factors on the columns that go with one kilogram at the arm's length, shape (11 n,)."""
     length = size_of(robot)
     body = [1.0, *(length,) * 3, *(length**2,) * 6]
@@ -352,7 +352,7 @@ def check_base_parameters(robot: Robot, base: BaseParameters, *, seed: int = 1) 
     columns = _random_columns(robot, seed + 1000)
     # Every column that moves the torque, not only those that the reduction knows of.
     size = np.linalg.norm(columns, axis=0)
-    entering = size * _parameter_scale(robot)
+    entering = size * parameter_scale(robot)
     used = entering > RANK_TOLERANCE * np.max(entering)
     if not np.any(base.grouping[:, 10 * robot.n :]):
         used[10 * robot.n :] = False

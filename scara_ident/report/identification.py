@@ -22,6 +22,7 @@ from scara_ident.estimation.urdf_weight import rotor_sentence, scale_in_words
 from scara_ident.export.result import KEY, rebuild_entry
 from scara_ident.identification.identify import (
     Identification,
+    determined_in_sums,
     insignificant_parameters,
     of_unknown_std,
     undetermined,
@@ -148,13 +149,18 @@ def _others(identification: Identification) -> list[str]:
         )
     else:
         found.append("Nothing was held out: give --validate recordings to learn how well it predicts.")
-    open_ = undetermined(identification)
+    open_, in_sums = undetermined(identification), determined_in_sums(identification)
+    if in_sums:
+        found.append(
+            f"{listed(in_sums, MAX_NAMED)} {'is' if len(in_sums) == 1 else 'are'} less sure than all bodies of the description together "
+            "are large: the torque tells sums with others, and of each alone nothing."
+        )
     if open_:
         found.append(
             f"The data leave {listed(open_, MAX_NAMED)} undetermined; a motion that excites {'it' if len(open_) == 1 else 'them'} "
             "is needed."
         )
-    else:
+    elif not in_sums:
         found.append("Every parameter is determined.")
     possible = identification.physical_consistency
     if possible.possible:

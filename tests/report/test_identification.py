@@ -114,6 +114,18 @@ def test_what_is_not_told_from_zero_is_named(result):
     assert "P_d1" not in small[0]
 
 
+def test_bodies_that_only_sums_tell_are_not_said_to_be_determined(result):
+    """Of an arm of half a kilogram, by a URDF whose right angles have few digits, m2 was -1400 ± 3400 kg: every parameter was determined."""
+    assert "Every parameter is determined." in sentences(result)
+    estimate, place = result.estimate, list(result.model.names).index("P_d5")
+    covariance = estimate.covariance.copy()
+    covariance[place, place] = 1e6
+    said = sentences(replace(result, estimate=replace(estimate, covariance=covariance)))
+    assert "Every parameter is determined." not in said
+    (own,) = (text for text in said if "the torque tells sums with others" in text)
+    assert own.startswith("P_d5 is less sure than all bodies of the description together are large")
+
+
 def test_where_no_standard_deviation_is_known_that_is_said(result):
     """Of a carriage pushed once a mass of 25.2 kg, with no standard deviation, was within two of zero."""
     assert not [text for text in sentences(result) if text.startswith("How sure ")]
