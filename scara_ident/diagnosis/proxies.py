@@ -7,12 +7,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from scara_ident.diagnosis.candidates.candidates import Candidate
 from scara_ident.diagnosis.criteria import SelectionCriteria
 from scara_ident.diagnosis.evidence.outcome import Outcome
 from scara_ident.diagnosis.selection.search_state import Step
 from scara_ident.diagnosis.testing.acceptance import Decision
 from scara_ident.diagnosis.testing.moments import examine_moments
 from scara_ident.diagnosis.testing.selection_step import SelectionStep, observed
+from scara_ident.effects import Scene
 from scara_ident.estimation.least_squares import value_and_weights
 from scara_ident.estimation.noise_bias import noise_torque
 from scara_ident.estimation.run_offsets import rms_of
@@ -69,7 +71,7 @@ def proxies(found: Outcome, criteria: SelectionCriteria) -> list[Decision]:
         decision = step.decision
         if uncounted and decision.candidate.corrects_data:
             continue
-        owner = decision.candidate.joint(search.scene)
+        owner = _asked_on(decision.candidate, search.scene)
         removal = _removal(
             rest, dict(zip(search.base.robot.joints, zip(without, beside, strict=True), strict=True)), owner
         )
@@ -86,6 +88,16 @@ def proxies(found: Outcome, criteria: SelectionCriteria) -> list[Decision]:
             once = _only_repeated(search.step, labels.index(decision.label), criteria)
             refused += [decision.refused(once)] if once else []
     return refused
+
+
+def _asked_on(candidate: Candidate, scene: Scene) -> str | None:
+    """Return the joint of whose remainder an effect must remove its part; None where it is that of all joints.
+
+    What moves links elsewhere than recorded is in the torque of every joint that bears them, and of a force on the tool one
+    joint's part may look like it: it has to do for all of them.
+    """
+    effect = candidate.effect
+    return None if effect.all_joints and effect.on_links else candidate.joint(scene)
 
 
 def _not_repeating(found: Outcome, left: frozenset[str] | set[str]) -> Mapping[str, _NotRepeating]:

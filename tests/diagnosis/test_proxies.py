@@ -123,6 +123,30 @@ class Waves(Spring):
         return [np.sin(3.0 * signals.motion.q[0])]
 
 
+class Moved(Spring):
+    """What moves links elsewhere than recorded, of which the first joint alone shows anything."""
+
+    name = "moved"
+    all_joints = True
+
+    def signal_columns(self, signals, member):
+        return [np.outer([1.0, 0.0], signals.motion.q[0])]
+
+    def columns(self, scene, member):
+        return super().columns(scene, member)[:1]
+
+
+@pytest.mark.parametrize("left", [0.0, 0.05])
+def test_what_moves_links_has_to_do_for_all_joints(left: float) -> None:
+    """A force on the tool was a zero of joint 5 that was 15 degrees off, by what it removed there, and joints 1 to 4 stayed unexplained."""
+    runs = with_torque(exact_runs(2, 3), 0, lambda motion: 0.015 * motion.q[0])
+    runs = with_torque(runs, 1, lambda motion: left * np.sin(5.0 * motion.q[1]))
+    outcome = selected(runs, Moved(), bands=(11.0, 11.0), free=False)
+    assert (outcome.unexplained is not None) == (left > 0.0)
+    assert found(outcome) == (set() if left else {"moved of joint1"})
+    assert ("moved of joint1" in {item.label for item in outcome.demoted}) == (left > 0.0)
+
+
 @pytest.mark.slow
 def test_what_a_delay_removes_is_asked_beside_what_came_in_after_it() -> None:
     """A delay of 6 ms came in before a bent torque sensor of three times its size, and was taken for a part of that (UR5)."""
