@@ -10,7 +10,7 @@ from scara_ident.arrays import Array
 from scara_ident.effects.effect import DOUBT_STDS
 from scara_ident.effects.following import EstimateSlopes
 from scara_ident.effects.friction import friction_of, friction_places
-from scara_ident.effects.measurement import SAMPLING, TimeDelay, lacking
+from scara_ident.effects.measurement import DELAY_STEP, SAMPLING, TimeDelay, lacking
 from scara_ident.effects.parameters import Member, Parameter, deviation
 from scara_ident.effects.signals import Scene, Signals
 from scara_ident.estimation.run_variation import MIN_RUNS
@@ -101,11 +101,19 @@ class DelayOfEachRecording(TimeDelay):
         """Return nothing: a filter of the positions is the same in all recordings."""
 
     def or_else(self, scene: Scene, member: Member, value: Array) -> str:
-        """Say which of both is late where the mean is negative."""
-        return super().or_else(scene, member, np.mean(value, keepdims=True))
+        """Say so where they do not differ, and which of both is late where the mean is negative."""
+        said = ", here by the same in all" if _one(value) else ""
+        return said + super().or_else(scene, member, np.mean(value, keepdims=True))
 
     def parameters(self, scene: Scene, member: Member, value: Array, covariance: Array) -> Mapping[str, Parameter]:
-        """Return the mean delay, and that of each recording."""
+        """Return the mean delay, and that of each recording where they differ."""
         mean, unsure = self.alike(value, covariance)
+        if _one(value):
+            return {"delay": Parameter(float(mean[0]), deviation(unsure), "s")}
         each = super().parameters(scene, member, value, covariance)
         return {"delay": Parameter(float(mean[0]), deviation(unsure), "s"), **each}
+
+
+def _one(value: Array) -> bool:
+    """Return whether the delays differ by less than what data are corrected to: they were drawn to their mean."""
+    return len(value) > 1 and float(np.ptp(value)) < DELAY_STEP

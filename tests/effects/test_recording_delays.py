@@ -55,6 +55,16 @@ def test_the_mean_is_unsure_by_how_much_recordings_differ():
     assert (one[0].tolist(), one[1].tolist()) == ([0.001], [[4e-8]])
 
 
+def test_delays_that_do_not_differ_are_told_as_one():
+    """Of a filter of the torque five recordings had a delay of 0.0154 s each, `by another time in each recording`."""
+    value, covariance = 0.0154 + 1e-6 * np.arange(3), np.diag([4e-8, 1e-8, 4e-8])
+    assert list(EFFECT.parameters(scene(), ARM, value, covariance)) == ["delay"]
+    assert EFFECT.or_else(scene(), ARM, value) == ", here by the same in all"
+    apart = value + np.array([0.0, 1e-3, 0.0])
+    assert len(EFFECT.parameters(scene(), ARM, apart, covariance)) == 4
+    assert EFFECT.or_else(scene(), ARM, apart) == ""
+
+
 def test_what_is_asked_of_a_delay_is_asked_of_the_largest():
     here = replace(scene(), rate=500.0)
     small, large = np.array([0.001, -0.0005, 0.0]), np.array([0.001, -0.003, 0.0])
