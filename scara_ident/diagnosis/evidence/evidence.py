@@ -150,7 +150,7 @@ def _of_joint(
     if limit > criteria.min_power:
         missing = (
             "nothing missing"
-            if limit >= 1.0
+            if round(limit, 2) >= 1.0
             else f"nothing missing that makes less than {limit:.0%} of the squared residual"
         )
         why = f"{missing} would have been significant: record more"

@@ -219,3 +219,11 @@ def test_what_is_far_above_the_noise_is_doubted_where_it_is_hardly_shown_to_repe
     fit = LackOfFit("joint1", 0.00413, missing, 2.0 * missing, p_value, ())
     told = _of_joint("joint1", "N m", fit, 0.05, "white noise", 0.05, (0.03, 0.0, CRITERIA.far_above_noise), CRITERIA)
     assert told.shown == shown and told.by == ("whiteness" if shown else "repetition")
+
+
+@pytest.mark.parametrize(("limit", "said"), [(0.984, True), (0.997, False), (1.0, False)])
+def test_a_limit_that_is_all_but_the_whole_residual_is_not_told_as_its_share(limit, said):
+    """`nothing missing that makes less than 100% of the squared residual` says nothing."""
+    told = _of_joint("joint1", "N m", None, 0.05, "white noise", limit, (0.0, 0.0, CRITERIA.far_above_noise), CRITERIA)
+    assert ("that makes less than 98% of the squared residual" in told.why) is said
+    assert told.why.startswith("nothing missing would have been significant") is not said
