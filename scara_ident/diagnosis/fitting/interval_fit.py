@@ -113,7 +113,7 @@ def seen_by_joints(
 
 
 def bounds_of_cells(width: float, reach: tuple[float, float]) -> Array:
-    """Return the bounds of cells about the rows of a recording, s; each row is in the middle of one.
+    """Return the bounds of cells about the rows of a recording, s; each row is in the middle of one, and none is of no length.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def bounds_of_cells(width: float, reach: tuple[float, float]) -> Array:
     reach : tuple of float
         When the recording begins and ends, s.
     """
-    count = int(np.ceil(reach[1] / width)) + 1
+    count = int(np.ceil(reach[1] / width + 0.5))
     return np.clip(width * (np.arange(count + 1) - 0.5), *reach)
 
 
