@@ -34,11 +34,12 @@ def remainder_objection(step: SelectionStep, decision: Decision) -> str | None:
         float(np.sum(each)) for each in (without.model.squares, decision.examination.left, rest.model.squares)
     )
     share = (left - float(np.sum(both.model.squares))) / (before - own) if own < before else 0.0
-    # What has nothing to do with it removes as much with it as without.
-    if share >= step.criteria.min_beside_rest:
+    instead, kept = before - left >= step.criteria.min_share * (before - own), share >= step.criteria.min_beside_rest
+    # What has nothing to do with it removes as much with it as without; where it would do alone, what is left has to be sure beside it.
+    if kept and not instead:
         return None
     what = step.rest.effect.description(step.scene, step.rest.member)
-    if before - left >= step.criteria.min_share * (before - own):
+    if instead and not kept:
         return f"{what} does as well in its place, and beside it {max(share, 0.0):.0%} of this is left"
     (again,) = both.without(len(rest.chosen)).judge(both.chosen[-1:])
     return None if again.accepted else f"beside {what} {max(share, 0.0):.0%} of this is left: {again.why}"

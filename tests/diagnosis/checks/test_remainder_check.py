@@ -177,3 +177,6 @@ def test_what_a_rest_leaves_too_little_of_to_come_in_is_refused_whatever_the_res
     assert objection(0.31, accepted=True, in_place=0.6) is None
     assert objection(0.6, accepted=False, in_place=0.6) is None
     assert "does as well in its place" in objection(0.05, accepted=True, in_place=0.9)
+    # Of a rigid UR10 behind a lag of 8 ms a gear of 270,000 N m/rad came in by 57 % of what it did alone, of which a filter did more.
+    assert objection(0.57, accepted=False, in_place=1.2) == "beside a filter 57% of this is left: not significant"
+    assert objection(0.57, accepted=True, in_place=1.2) is None
