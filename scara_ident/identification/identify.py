@@ -355,7 +355,7 @@ def undetermined(identification: Identification) -> list[str]:
 def determined_in_sums(identification: Identification) -> list[str]:
     """Return the names of determined parameters of bodies that are less sure than all bodies of the description are large.
 
-    They hardly differ from sums of others, as where an angle of the description has few digits: the torque tells them together.
+    They hardly differ from sums of others, as where an angle of the description has few digits: the torque determines them together.
     Where efforts are in units of their own, bodies are as many times larger.
     """
     estimate, robot, term = identification.estimate, identification.model.robot, identification.model.rigid_body

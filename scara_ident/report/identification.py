@@ -153,7 +153,7 @@ def _others(identification: Identification) -> list[str]:
     if in_sums:
         found.append(
             f"{listed(in_sums, MAX_NAMED)} {'is' if len(in_sums) == 1 else 'are'} less sure than all bodies of the description together "
-            "are large: the torque tells sums with others, and of each alone nothing."
+            "are large: the torque determines sums with others, and none of them alone."
         )
     if open_:
         found.append(

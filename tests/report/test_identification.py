@@ -122,7 +122,7 @@ def test_bodies_that_only_sums_tell_are_not_said_to_be_determined(result):
     covariance[place, place] = 1e6
     said = sentences(replace(result, estimate=replace(estimate, covariance=covariance)))
     assert "Every parameter is determined." not in said
-    (own,) = (text for text in said if "the torque tells sums with others" in text)
+    (own,) = (text for text in said if "the torque determines sums with others" in text)
     assert own.startswith("P_d5 is less sure than all bodies of the description together are large")
 
 

@@ -156,7 +156,7 @@ def _of_joint(
         why = f"{missing} would have been significant: record more"
         return Evidence(joint, False, "", why, limit)
     if fit is not None and repeats and fit.missing > small:
-        why = f"{_beside(fit, unit)}: more than filters and encoders alone leave, and no effect that was tried tells what it is"
+        why = f"{_beside(fit, unit)}: more than filters and encoders alone leave, and no effect that was tried explains it"
         return Evidence(joint, False, "repetition", why, limit)
     if fit is not None and fit.max_missing <= criteria.remainder_to_noise * fit.noise:
         why = f"repetitions leave at most {fit.max_missing:.3g} {unit} that repeats, and {fit.noise:.3g} {unit} that does not"

@@ -167,7 +167,7 @@ def test_what_surely_repeats_is_no_noise_however_small_beside_it(nothing_missing
     said = "0.009 N m repeats from run to run (p = 1.3e-14) beside 0.0103 N m that does not: more than filters"
     assert found[0].why.startswith(said) != shown
     # Twenty times the noise was "too little to tell what it is".
-    assert found[0].why.endswith("and no effect that was tried tells what it is") != shown
+    assert found[0].why.endswith("and no effect that was tried explains it") != shown
     # Then the model lacks something, whatever it is.
     assert [item.lacks for item in found] == [not shown, not shown]
 
@@ -222,8 +222,8 @@ def test_what_is_far_above_the_noise_is_doubted_where_it_is_hardly_shown_to_repe
 
 
 @pytest.mark.parametrize(("limit", "said"), [(0.984, True), (0.997, False), (1.0, False)])
-def test_a_limit_that_is_all_but_the_whole_residual_is_not_told_as_its_share(limit, said):
+def test_a_limit_that_is_all_but_the_whole_residual_is_not_found_as_its_share(limit, said):
     """`nothing missing that makes less than 100% of the squared residual` says nothing."""
-    told = _of_joint("joint1", "N m", None, 0.05, "white noise", limit, (0.0, 0.0, CRITERIA.far_above_noise), CRITERIA)
-    assert ("that makes less than 98% of the squared residual" in told.why) is said
-    assert told.why.startswith("nothing missing would have been significant") is not said
+    found = _of_joint("joint1", "N m", None, 0.05, "white noise", limit, (0.0, 0.0, CRITERIA.far_above_noise), CRITERIA)
+    assert ("that makes less than 98% of the squared residual" in found.why) is said
+    assert found.why.startswith("nothing missing would have been significant") is not said
