@@ -53,6 +53,10 @@ def _others(diagnosis: Diagnosis) -> list[str]:
             found.append(f"These recordings cannot tell it from: {others}.")
     if diagnosis.verdict == "undecided":
         found += [*_to_do_first(diagnosis), *_not_shown(diagnosis.evidence)]
+    elif diagnosis.unexplained is not None:
+        found += _not_shown(
+            [item for item in diagnosis.evidence if item.lacks and item.joint != diagnosis.unexplained.joint]
+        )
     if diagnosis.effects:
         found += _errors(diagnosis)
     for guess in diagnosis.tentative:

@@ -173,6 +173,17 @@ def test_where_what_is_left_depends_on_no_signal_it_is_said_what_to_do_first(res
     assert not any(words.startswith("To do first") for words in sentences(shown))
 
 
+def test_beside_a_joint_that_stays_unexplained_others_that_lack_something_are_named(result):
+    """On the shoulder something was left, and of the slide, whose rotor was -0.47 ± 0.01 kg m^2, nothing was said."""
+    evidence = tuple(replace(item, shown=False, why=f"reason of {item.joint}", lacks=True) for item in result.evidence)
+    left = replace(result, verdict="unexplained", unexplained=Unexplained("joint1", (), 0.1, 0.0), evidence=evidence)
+    said = sentences(left)
+    assert "On joint2: reason of joint2." in said
+    assert not any("reason of joint1" in text for text in said)
+    unsure = tuple(replace(item, lacks=False) for item in evidence)
+    assert not any("reason of" in text for text in sentences(replace(left, evidence=unsure)))
+
+
 def test_what_is_unexplained_is_said_to_go_as_an_effect_that_no_arm_has():
     """A force that pushed away from rest, told to 1e-80, stood in the table of candidates alone."""
     runs = with_torque(exact_runs(), 0, lambda motion: -0.3 * motion.q[0])
