@@ -76,9 +76,10 @@ class DelayOfEachRecording(TimeDelay):
 
     def negligible(self, scene: Scene, member: Member, value: Array) -> str | None:
         """Say so where that of no recording is longer than a sample."""
-        largest = float(np.max(np.abs(value)))
-        if len(value) == 1 or largest * scene.rate > SAMPLING:
-            return super().negligible(scene, member, value[:1]) if len(value) == 1 else None
+        if len(value) == 1 or _one(value):
+            return super().negligible(scene, member, np.mean(value, keepdims=True))
+        if float(np.max(np.abs(value))) * scene.rate > SAMPLING:
+            return None
         return (
             f"effort and position are {1e3 * float(np.min(value)):+.2g} to {1e3 * float(np.max(value)):+.2g} ms apart, by another "
             "time in each recording, less than one sample"

@@ -60,6 +60,11 @@ def test_delays_that_do_not_differ_are_told_as_one():
     value, covariance = 0.0154 + 1e-6 * np.arange(3), np.diag([4e-8, 1e-8, 4e-8])
     assert list(EFFECT.parameters(scene(), ARM, value, covariance)) == ["delay"]
     assert EFFECT.or_else(scene(), ARM, value) == ", here by the same in all"
+    slow = replace(scene(), rate=50.0)
+    assert EFFECT.negligible(slow, ARM, value).startswith(
+        "effort and position are +15 ms apart, less than one sample, as when"
+    )
+    assert EFFECT.negligible(replace(scene(), rate=500.0), ARM, value) is None
     apart = value + np.array([0.0, 1e-3, 0.0])
     assert len(EFFECT.parameters(scene(), ARM, apart, covariance)) == 4
     assert EFFECT.or_else(scene(), ARM, apart) == ""
