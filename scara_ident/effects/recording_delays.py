@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.effects.effect import DOUBT_STDS
+from scara_ident.effects.effect import DOUBT_STDS, Effect
 from scara_ident.effects.following import EstimateSlopes
 from scara_ident.effects.friction import friction_of, friction_places
 from scara_ident.effects.measurement import DELAY_STEP, SAMPLING, TimeDelay, lacking
@@ -98,8 +98,9 @@ class DelayOfEachRecording(TimeDelay):
         """Return nothing: when friction turns is in no column of it."""
         return ()
 
-    def leaves(self, scene: Scene, member: Member, value: Array) -> None:
-        """Return nothing: a filter of the positions is the same in all recordings."""
+    def leaves(self, scene: Scene, member: Member, value: Array) -> tuple[Effect, Member, float] | None:
+        """Return the rest of a filter of the positions where these are late in all recordings: a filter is, clocks are by chance."""
+        return super().leaves(scene, member, np.mean(value, keepdims=True)) if np.all(value < 0.0) else None
 
     def or_else(self, scene: Scene, member: Member, value: Array) -> str:
         """Say so where they do not differ, and which of both is late where the mean is negative."""

@@ -83,3 +83,15 @@ def test_what_is_asked_of_a_delay_is_asked_of_the_largest():
     assert EFFECT.settled(np.array([1e-6, -1e-5])) and not EFFECT.settled(np.array([0.0, -1e-4]))
     assert "by less than nothing" in EFFECT.or_else(here, ARM, large)
     assert EFFECT.leaves(here, ARM, large) is None
+
+
+def test_of_positions_that_are_late_in_all_recordings_the_rest_of_a_filter_may_be_left():
+    """A rigid Panda behind a lag of 18 ms had delays of each recording, and elastic gears of two joints for what the filter left."""
+    here, late = replace(scene(), rate=500.0), np.array([-0.018, -0.0179, -0.0181])
+    one, all_ = (
+        effect.leaves(here, ARM, delays) for effect, delays in ((TimeDelay(), np.array([-0.018])), (EFFECT, late))
+    )
+    assert one is not None and all_ is not None
+    assert one[:2] == all_[:2] and one[2] == pytest.approx(all_[2])
+    assert EFFECT.leaves(here, ARM, late + np.array([0.0, 0.02, 0.0])) is None
+    assert EFFECT.leaves(here, ARM, -late) is None
