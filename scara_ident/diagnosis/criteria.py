@@ -126,7 +126,7 @@ class SelectionCriteria:
     min_beside_rest: float = _criterion(
         0.5,
         "of what it removes",
-        "that an effect must still remove beside the rest of a correction of the data that does as well in its place",
+        "that an effect must still remove beside what does as well in its place and is no effect: the rest of a correction, or a force on the tool",
         "docs/diagnosis.md",
     )
     # What is left over.

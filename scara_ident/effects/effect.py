@@ -83,19 +83,17 @@ class Effect(ABC):
     in_small_ways : bool
         Whether it is determined by small differences of positions, as setpoints do from what a controller makes of them.
     of_state : bool
-        Whether the columns at a sample follow from position, velocity and acceleration there, by numpy's arithmetic, sin,
-        cos, exp, abs and sign alone, so that code for a controller can have them.
+        Whether columns follow from the state at the sample by numpy's arithmetic, sin, cos, exp, abs and sign, as a controller's code can.
     smooth : bool
-        Whether the columns have nothing faster than the filtered motion, as a jump of friction is, so that fewer samples are
-        enough of them within the band: they are then made at these, see `PreparedStretch.decimated`.
+        Whether the columns have nothing faster than the filtered motion: they are made at `PreparedStretch.decimated` samples.
     seeded_by : {"order", "frequency"} or None
         The lines of a residual's spectrum that suggest a member; see `seeds`.
+    imitated_by : tuple of Effect
+        What no catalogue has and may be taken for it: it is not believed where one of these does as well and nothing of it is left beside.
     watched : bool
         Whether it comes or grows as an arm ages, so that a fleet is watched for it.
-    view : View
-        What a figure shows it over.
-    experiment : str
-        What to record to bring it out against the others.
+    view, experiment : View, str
+        What a figure shows it over, and what to record to bring it out against the others.
     not_simulated : str
         Why the virtual arm does not have it; empty where ``scara_ident.simulation`` has an effect of its name.
     """
@@ -105,6 +103,7 @@ class Effect(ABC):
     coefficients: ClassVar[tuple[Coefficient, ...]] = ()
     nonlinear: ClassVar[tuple[NonlinearParameter, ...]] = ()
     all_joints: ClassVar[bool] = False
+    imitated_by: ClassVar[tuple[Effect, ...]] = ()
     at_rest: ClassVar[bool] = False
     follows_estimate: ClassVar[bool] = False
     on_links: ClassVar[bool] = False

@@ -15,6 +15,7 @@ from scara_ident.effects.links import first_moments, gravity_columns, gravity_to
 from scara_ident.effects.parameters import Member, NonlinearParameter, Parameter, View
 from scara_ident.effects.signals import Scene, Signals
 from scara_ident.effects.spanned import rows_by_sample
+from scara_ident.effects.tool_force import ToolForce
 from scara_ident.model.terms import Column, RigidBody
 from scara_ident.robot.robot import Robot
 
@@ -147,6 +148,7 @@ class _Tilt(Effect):
     on_links = True
     of_position = True
     of_state = True
+    imitated_by = (ToolForce(),)
     watched = True
     view = View("position")
     experiment = "hold still, or creep, at positions over more than half a turn: a tilt follows the angle's sine, a spring the angle"

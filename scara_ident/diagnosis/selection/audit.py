@@ -9,6 +9,7 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.candidates.candidates import Candidate
+from scara_ident.diagnosis.checks.imitation_check import imitation_objection
 from scara_ident.diagnosis.checks.noise_check import BY_NOISE, made_by_noise, noise_objection, within_a_step
 from scara_ident.diagnosis.checks.remainder_check import remainder_objection
 from scara_ident.diagnosis.checks.same_errors import same
@@ -62,6 +63,7 @@ def unsettled(found: Search, weights: Array) -> list[Decision]:
         why = why or noise_objection(beside, decision)
         why = why or variation_objection(beside, decision, step.criteria.min_gain)
         why = why or remainder_objection(beside, decision)
+        why = why or imitation_objection(beside, decision)
         why = why or _repeated(beside, decision)
         if why is not None:
             result.append(decision.refused(why))

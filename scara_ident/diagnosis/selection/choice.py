@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from scara_ident.diagnosis.candidates.candidates import Candidate
+from scara_ident.diagnosis.checks.imitation_check import imitation_objection
 from scara_ident.diagnosis.checks.noise_check import noise_objection, noise_of_column
 from scara_ident.diagnosis.checks.remainder_check import remainder_objection
 from scara_ident.diagnosis.checks.same_errors import same
@@ -265,6 +266,7 @@ def objection(step: SelectionStep, decision: Decision) -> str | None:
         or noise_objection(step, decision)
         or variation_objection(step, decision)
         or remainder_objection(step, decision)
+        or imitation_objection(step, decision)
         or _left_again(step, decision)
     )
 

@@ -1,0 +1,39 @@
+"""Whether what no catalogue has, such as a constant force on the tool, does as well as an effect that it is taken for."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from scara_ident.diagnosis.candidates.candidates import Candidate
+from scara_ident.diagnosis.fitting.nonlinear_fit import tune
+from scara_ident.diagnosis.testing.acceptance import Decision
+from scara_ident.diagnosis.testing.selection_step import SelectionStep
+
+
+def imitation_objection(step: SelectionStep, decision: Decision) -> str | None:
+    """Say so where something else removes as much on folds that it was not fitted to, and beside it little of the effect is left.
+
+    By their gain on folds both are judged alike: there further coefficients are no advantage.
+
+    Parameters
+    ----------
+    step : SelectionStep
+        The model that the effect was tried beside.
+    decision : Decision
+        That lets it in.
+    """
+    effect, criteria = decision.candidate.effect, step.criteria
+    others = [Candidate(other, member) for other in effect.imitated_by for member in other.members(step.scene)]
+    for other, instead in zip(others, step.judge(others) if others else [], strict=True):
+        if not instead.accepted or instead.examination.held_out < decision.examination.held_out:
+            continue
+        alone = tune(replace(step, chosen=(*step.chosen, other)))
+        both = tune(replace(alone, chosen=(*alone.chosen, decision.candidate)))
+        own = np.sum(step.model.squares) - np.sum(decision.examination.left)
+        share = float(np.sum(alone.model.squares) - np.sum(both.model.squares)) / float(own)
+        if share < criteria.min_beside_rest:
+            what = other.effect.description(step.scene, other.member)
+            return f"{what} does as well in its place, and beside it {max(share, 0.0):.0%} of this is left"
+    return None
