@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -24,6 +25,32 @@ def imitation_objection(step: SelectionStep, decision: Decision) -> str | None:
     decision : Decision
         That lets it in.
     """
+    for other, share in _imitating(step, decision):
+        what = other.effect.description(step.scene, other.member)
+        return f"{what} does as well in its place, and beside it {max(share, 0.0):.0%} of this is left"
+    return None
+
+
+def imitators(step: SelectionStep, candidates: Sequence[Candidate]) -> list[Candidate]:
+    """Return what does as well as candidates that it may be taken for, where these are significant: it is there, or is like what is.
+
+    Parameters
+    ----------
+    step : SelectionStep
+        The base model.
+    """
+    asked, criteria = [item for item in candidates if item.effect.imitated_by], step.criteria
+    return [
+        other
+        for decision in (step.judge(asked) if asked else [])
+        # An arm need not be able to have as much of it.
+        if decision.examination.p_value * step.tried <= criteria.family_error and decision.gain >= criteria.min_gain
+        for other, _ in _imitating(step, decision)
+    ]
+
+
+def _imitating(step: SelectionStep, decision: Decision) -> Iterator[tuple[Candidate, float]]:
+    """Give what does as well as an effect, with the share of what this removes that is left beside it, less than is asked."""
     effect, criteria = decision.candidate.effect, step.criteria
     others = [Candidate(other, member) for other in effect.imitated_by for member in other.members(step.scene)]
     for other, instead in zip(others, step.judge(others) if others else [], strict=True):
@@ -34,6 +61,4 @@ def imitation_objection(step: SelectionStep, decision: Decision) -> str | None:
         own = np.sum(step.model.squares) - np.sum(decision.examination.left)
         share = float(np.sum(alone.model.squares) - np.sum(both.model.squares)) / float(own)
         if share < criteria.min_beside_rest:
-            what = other.effect.description(step.scene, other.member)
-            return f"{what} does as well in its place, and beside it {max(share, 0.0):.0%} of this is left"
-    return None
+            yield other, share

@@ -9,7 +9,7 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.candidates.candidates import Candidate
-from scara_ident.diagnosis.checks.imitation_check import imitation_objection
+from scara_ident.diagnosis.checks.imitation_check import imitation_objection, imitators
 from scara_ident.diagnosis.checks.noise_check import BY_NOISE, made_by_noise, noise_objection, within_a_step
 from scara_ident.diagnosis.checks.remainder_check import remainder_objection
 from scara_ident.diagnosis.checks.same_errors import same
@@ -113,9 +113,10 @@ def _repeated(step: SelectionStep, decision: Decision) -> str | None:
 
 
 def outdone(found: Search, weights: Array, refused: Sequence[Decision]) -> list[Decision]:
-    """Return the decisions on effects in whose place one that is not believed does as well, with why.
+    """Return the decisions on effects in whose place one that is not believed, or what is no effect, does as well, with why.
 
-    What was refused may have been there all the same, and what is found without it then stands for it.
+    What was refused may have been there all the same, and what is found without it then stands for it; as for what an effect
+    was not believed for, see `imitators`.
 
     Parameters
     ----------
@@ -129,14 +130,21 @@ def outdone(found: Search, weights: Array, refused: Sequence[Decision]) -> list[
     step = replace(found.step, weights=weights)
     # What turns within a step of the encoder is not there: it mends friction's sign, as some of what is there does too.
     alternatives = [item.candidate for item in refused if within_a_step(step, item.candidate) is None]
+    tried = [item.candidate for item in best_of_each(found.decisions).values()]
+    listed_nowhere = imitators(replace(step, chosen=()), tried) if step.chosen else []
+    alternatives += listed_nowhere
     result = []
     for place, candidate in enumerate(step.chosen if alternatives else ()):
         beside = step.without(place)
         own, *others = beside.judge([candidate, *alternatives])
-        enough = step.criteria.min_share * own.examination.held_out
-        best = max(others, key=lambda item: item.examination.held_out)
-        if best.examination.held_out >= enough:
-            result.append(own.refused(f"{best.label}, which is not believed, does as well in its place"))
+        saved = own.examination.held_out
+        for other in sorted(others, key=lambda item: -item.examination.held_out):
+            unlisted = other.candidate in listed_nowhere
+            # What nobody believed, and is an effect, need not do all of it; what is none has to do it all.
+            if other.examination.held_out >= (1.0 if unlisted else step.criteria.min_share) * saved:
+                what = other.candidate.effect.summary if unlisted else f"{other.label}, which is not believed,"
+                result.append(own.refused(f"{what} does as well in its place"))
+                break
     return result
 
 

@@ -29,7 +29,7 @@ def arm(tmp_path: Path) -> Robot:
     return load_robot(write_urdf(tmp_path / "arm.urdf", LINKS))
 
 
-def diagnosed(robot: Robot, tilt: tuple[float, float], force: tuple[float, float, float]) -> Diagnosis:
+def diagnosed(robot: Robot, tilt: tuple[float, float], force: tuple[float, float, float], *names: str) -> Diagnosis:
     runs, rng, time = [], np.random.default_rng(3), np.arange(2500) / 250.0
     for k in range(4):
         q, v, a = sines(rng, time, 3, size=0.8, lowest=0.2)
@@ -38,7 +38,7 @@ def diagnosed(robot: Robot, tilt: tuple[float, float], force: tuple[float, float
         torque = recorded_torque(leaning(robot, tilt), q, v, a, FRICTION) - pulled
         noise = 0.02 * np.max(np.abs(torque), axis=1, keepdims=True) * rng.standard_normal(torque.shape)
         runs.append(recording(robot, f"t{k}_1", time, q, torque + noise))
-    return diagnose(robot, runs[:3], validation=runs[3:], catalogue=effects_named("base_tilt"))
+    return diagnose(robot, runs[:3], validation=runs[3:], catalogue=effects_named("base_tilt", *names))
 
 
 @pytest.mark.parametrize("force", [(4.0, -3.0, 0.0), (2.0, -1.0, 0.0)])
@@ -49,6 +49,14 @@ def test_a_force_on_the_tool_is_not_believed_to_be_a_base_that_leans(arm: Robot,
     (guess,) = result.tentative
     assert guess.effect == "base_tilt"
     assert guess.why == "a constant force on the tool does as well in its place, and beside it 0% of this is left"
+
+
+@pytest.mark.parametrize("force", [(4.0, -3.0, 0.0), (8.0, -6.0, 5.0)])
+def test_nor_does_a_spring_stand_for_it(arm: Robot, force: tuple[float, float, float]):
+    """Without the tilt, which is refused or would be seen by eye, what a force does all of was left to springs and counterbalances."""
+    result = diagnosed(arm, (0.0, 0.0), force, "spring", "gravity_counterbalance")
+    assert not result.effects
+    assert "a constant force on the tool does as well in its place" in {item.why for item in result.tentative}
 
 
 def test_a_base_that_leans_is_found_beside_what_a_force_would_do(arm: Robot):
