@@ -100,8 +100,15 @@ class Check:
 
     @cached_property
     def speed_share(self) -> float | None:
-        """Largest share of the speed, along the same path, at which all limits hold; None where none does."""
-        return 1.0 if not self.broken else _speed_share(self.known, self.limits, self.drives)
+        """Largest share of the speed, along the same path, at which all limits hold; None where none that was tried does."""
+        if not self.broken:
+            return 1.0
+        return None if self.broken_slowly else _speed_share(self.known, self.limits, self.drives)
+
+    @cached_property
+    def broken_slowly(self) -> tuple[Margin, ...]:
+        """Limits that do not hold at the slowest speed that is tried either."""
+        return _broken_at(MIN_SPEED_SHARE, self.known, self.limits, _thinned(self.drives))
 
     @cached_property
     def recorded_rms(self) -> Array | None:
@@ -194,21 +201,27 @@ def slowed(motion: Motion, share: float) -> Motion:
     )
 
 
-def _speed_share(known: IdentifiedModel, limits: JointLimits, drives: Sequence[Drive]) -> float | None:
-    every = max(1, sum(each.motion.samples for each in drives) // MAX_SAMPLES)
-    motions = [_every(each.motion, every) for each in drives]
-
-    def runs(share: float) -> bool:
-        slower = [drive(known, slowed(motion, share)) for motion in motions]
-        return all(each.kept for each in margins(known.robot, limits, slower))
-
+def _speed_share(known: IdentifiedModel, limits: JointLimits, drives: Sequence[Drive]) -> float:
+    """Return the largest share of the speed at which all limits hold, where the slowest is known to be one."""
+    motions = _thinned(drives)
     low, high = MIN_SPEED_SHARE, 1.0
-    if not runs(low):
-        return None
     for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if runs(middle) else (low, middle)
+        low, high = (low, middle) if _broken_at(middle, known, limits, motions) else (middle, high)
     return low
+
+
+def _broken_at(
+    share: float, known: IdentifiedModel, limits: JointLimits, motions: Sequence[Motion]
+) -> tuple[Margin, ...]:
+    """Return the limits that do not hold at a share of the speed."""
+    slower = [drive(known, slowed(motion, share)) for motion in motions]
+    return tuple(each for each in margins(known.robot, limits, slower) if not each.kept)
+
+
+def _thinned(drives: Sequence[Drive]) -> list[Motion]:
+    every = max(1, sum(each.motion.samples for each in drives) // MAX_SAMPLES)
+    return [_every(each.motion, every) for each in drives]
 
 
 def _every(motion: Motion, step: int) -> Motion:
@@ -270,7 +283,7 @@ def sentences(found: Check) -> list[str]:
     if found.broken:
         share = found.speed_share
         said.append(
-            "At no lower speed either: position or gravity is beyond a limit."
+            f"Nor can it at {MIN_SPEED_SHARE:g} of the speed, where {_still_beyond(found)}."
             if share is None
             else f"Along the same path it can be run at {share:.3g} of the speed."
         )
@@ -296,6 +309,11 @@ def sentences(found: Check) -> list[str]:
         f"{energy.heated.sum():.4g} J become heat in the joints."
     )
     return said
+
+
+def _still_beyond(found: Check) -> str:
+    names = list(dict.fromkeys(_named(each) for each in found.broken_slowly))
+    return f"{listed(names, MAX_NAMED)} {'is still beyond its limit' if len(names) == 1 else 'are still beyond their limits'}"
 
 
 def _close(found: Check) -> list[Margin]:

@@ -120,11 +120,22 @@ def test_what_is_beyond_a_position_limit_cannot_be_run_slower_either(known: Iden
     motion = Motion("still", "still", time, zero + 0.5, zero, zero, None, 100.0)
     found = check(known, [motion], joint_limits(known.robot, ranges={"joint1": (-0.1, 0.2)}))
     assert found.speed_share is None
-    assert "At no lower speed either" in check_dict(found)["summary"][1]
+    assert check_dict(found)["summary"][1].endswith("of the speed, where position of joint1 is still beyond its limit.")
     free = joint_limits(known.robot)
     endless = np.full(2, np.inf)
     free = replace(free, lower=-endless, upper=endless, velocity=endless, torque=endless)
     assert check_dict(check(known, [motion], free))["limited_by"] is None
+
+
+def test_what_keeps_a_motion_from_being_run_slowly_is_named_as_what_it_is(known: IdentifiedModel):
+    """Neither a position nor gravity, but a drive that gives next to nothing."""
+    time = np.linspace(0.0, 2.0, 201)
+    zero = np.zeros((2, 201))
+    motion = Motion("slide", "slide", time, 0.1 * time + zero, zero + 0.1, zero, None, 100.0)
+    found = check(known, [motion], joint_limits(known.robot, powers={"joint2": 1e-6}))
+    said = check_dict(found)["summary"][1]
+    assert said == "Nor can it at 0.02 of the speed, where power of joint2 is still beyond its limit."
+    assert "position" not in said and "gravity" not in said
 
 
 def test_a_trajectory_is_taken_as_it_is_and_a_recording_filtered(known: IdentifiedModel, tmp_path: Path):
