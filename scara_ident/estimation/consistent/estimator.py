@@ -11,6 +11,7 @@ from scara_ident.errors import EstimationError, UsageError
 from scara_ident.estimation.consistent.bodies import LinkInertia, link_inertia
 from scara_ident.estimation.consistent.constraints import active_set
 from scara_ident.estimation.consistent.feasibility import PhysicalConsistency, check_consistency
+from scara_ident.estimation.consistent.friction import as_recorded
 from scara_ident.estimation.consistent.options import ConsistentOptions
 from scara_ident.estimation.consistent.problem import (
     DEPENDENT,
@@ -116,8 +117,11 @@ def consistent(observations: Observations, *, options: ConsistentOptions | None 
         raise EstimationError("no recording to estimate from")
     plain = least_squares(observations, lambda joints: joint_weights(joints, options), "wls")
     rows = beside_offsets(observations, plain.offsets)
-    shapes = choose_shapes(declared(model, options)[1], options, observations, plain)
-    problem = Problem(model, replace(options, friction={choice.joint: choice.shape for choice in shapes}))
+    polynomials = [
+        as_recorded(each, plain.information.regressor_factor, plain.value) for each in declared(model, options)[1]
+    ]
+    shapes = choose_shapes(polynomials, options, observations, plain)
+    problem = Problem(model, replace(options, friction={choice.joint: choice.shape for choice in shapes}), polynomials)
     u = problem.unknowns
     parameter_prior, standard_prior = _priors(u, options)
     found, information, weights = solve_joints(

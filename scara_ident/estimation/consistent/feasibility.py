@@ -17,9 +17,16 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.errors import EstimationError, UsageError
-from scara_ident.estimation.consistent.friction import FrictionFault, friction_faults
+from scara_ident.estimation.consistent.friction import FrictionFault, as_recorded, friction_faults
 from scara_ident.estimation.consistent.options import ConsistentOptions
-from scara_ident.estimation.consistent.problem import DEPENDENT, Problem, Unknowns, build_unknowns, unless_panic
+from scara_ident.estimation.consistent.problem import (
+    DEPENDENT,
+    Problem,
+    Unknowns,
+    build_unknowns,
+    declared,
+    unless_panic,
+)
 from scara_ident.estimation.information import Information
 from scara_ident.model.model import TorqueModel
 from scara_ident.model.terms.constraints import BrakingPolynomial
@@ -299,9 +306,11 @@ def check_consistency(
 
 def _distance_std(model: TorqueModel, value: Array, information: Information) -> float | None:
     """Distance of the nearest possible arm in the data's own metric, None where the solver does not find it."""
-    problem = Problem(model, ConsistentOptions(friction="dissipative"))
-    u = problem.unknowns
+    options = ConsistentOptions(friction="dissipative")
     factor = information.regressor_factor / (information.rms() or 1.0)
+    polynomials = [as_recorded(each, factor, value) for each in declared(model, options)[1]]
+    problem = Problem(model, options, polynomials)
+    u = problem.unknowns
     try:
         point = problem.solve(factor @ u.to_parameters, factor @ value, 1e-2 * np.eye(u.size))
     except EstimationError:

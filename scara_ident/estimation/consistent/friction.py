@@ -8,7 +8,7 @@ semidefinite 2x2 matrix between (1, t), so the condition is convex and needs no 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -133,11 +133,33 @@ def _linear(matrix: Array, offset: Array, label: str) -> Cone:
 
 
 def _speed(polynomial: BrakingPolynomial) -> float:
-    return polynomial.speed if np.isfinite(polynomial.speed) else 1.0
+    return polynomial.speed if np.isfinite(polynomial.speed) else polynomial.usual_speed
 
 
 def _torque(polynomial: BrakingPolynomial) -> float:
-    return polynomial.limit if np.isfinite(polynomial.limit) else 1.0
+    return polynomial.limit if np.isfinite(polynomial.limit) else polynomial.usual_torque
+
+
+def as_recorded(polynomial: BrakingPolynomial, factor: Array, value: Array) -> BrakingPolynomial:
+    """Return a polynomial whose numbers are told in what recordings hold, where a limit is missing.
+
+    The solver leaves its constraints off by a share of such a unit, which may be anything beside 1 N m and 1 rad/s.
+
+    Parameters
+    ----------
+    factor : ndarray, shape (r, p)
+        Of [regressor | torque] over the noise of the torque, without its last column.
+    value : ndarray, shape (p,)
+        What friction is of about the size of.
+    """
+    places, powers = list(polynomial.columns), np.array(polynomial.powers)
+    norms = np.linalg.norm(factor[:, places], axis=0)
+    if len(powers) < 2 or not np.all(norms > 0.0):
+        return polynomial
+    # A column is as long as the speed's power is large; the first tells how large torque must be to be seen, too.
+    speed = float((norms[-1] / norms[0]) ** (1.0 / (powers[-1] - powers[0])))
+    torque = float(np.max(np.abs(value[places]) * speed**powers) + speed ** powers[0] / norms[0])
+    return replace(polynomial, usual_speed=speed, usual_torque=torque)
 
 
 @dataclass(frozen=True)

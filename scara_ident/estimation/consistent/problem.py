@@ -13,7 +13,7 @@ disciplined parametrised programme (Agrawal et al. 2019), so cvxpy's canonical f
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -147,7 +147,9 @@ class Unknowns:
         return np.asarray(self.to_parameters @ x)
 
 
-def build_unknowns(model: TorqueModel, options: ConsistentOptions) -> Unknowns:
+def build_unknowns(
+    model: TorqueModel, options: ConsistentOptions, polynomials: Sequence[BrakingPolynomial] | None = None
+) -> Unknowns:
     """Collect the unknowns and the constraints that the model's terms and the options declare.
 
     Friction whose shape is left to the data keeps what the friction of every arm does: it is dissipative.
@@ -165,7 +167,8 @@ def build_unknowns(model: TorqueModel, options: ConsistentOptions) -> Unknowns:
     size = rigid + len(others)
     where = {column: rigid + i for i, column in enumerate(others)}
 
-    positive, polynomials = declared(model, options)
+    positive, own = declared(model, options)
+    polynomials = own if polynomials is None else polynomials
     asked = [options.friction_of(p.joint) for p in polynomials]
     shapes: tuple[FrictionShape, ...] = tuple("dissipative" if shape == "auto" else shape for shape in asked)
     friction = [(p, certificate(p, shape)) for p, shape in zip(polynomials, shapes, strict=True) if shape != "free"]
@@ -257,11 +260,19 @@ class Point:
 
 
 class Problem:
-    """The compiled problem of one model and set of options; not to be shared by threads."""
+    """The compiled problem of one model and set of options; not to be shared by threads.
 
-    def __init__(self, model: TorqueModel, options: ConsistentOptions | None = None) -> None:
+    Friction is that of ``polynomials`` where they are given, else as the model declares it.
+    """
+
+    def __init__(
+        self,
+        model: TorqueModel,
+        options: ConsistentOptions | None = None,
+        polynomials: Sequence[BrakingPolynomial] | None = None,
+    ) -> None:
         self.options = options or ConsistentOptions()
-        self.unknowns: Unknowns = build_unknowns(model, self.options)
+        self.unknowns: Unknowns = build_unknowns(model, self.options, polynomials)
 
     @cached_property
     def cvxpy(self) -> Any:

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
@@ -8,7 +9,15 @@ import pytest
 from numpy.typing import NDArray
 
 from scara_ident.errors import EstimationError
-from scara_ident.estimation import ConsistentOptions, consistent, links, ols, physical_consistency, wls
+from scara_ident.estimation import (
+    ConsistentEstimate,
+    ConsistentOptions,
+    consistent,
+    links,
+    ols,
+    physical_consistency,
+    wls,
+)
 from scara_ident.estimation.bands import choose_bands
 from scara_ident.estimation.consistent.estimator import _beyond_constraints, _half_along
 from scara_ident.estimation.consistent.options import Ellipsoid
@@ -21,8 +30,9 @@ from scara_ident.motion.prepared import prepare
 from scara_ident.recording.recording import read_recording
 from scara_ident.robot.robot import Robot, load_robot
 from scara_ident.threads import one_blas_thread
-from tests.arms import motion, sines, swing
+from tests.arms import motion, sines, swing, write_urdf
 from tests.estimation.consistent.arms import (
+    WRIST,
     base_of,
     moving,
     observed,
@@ -299,3 +309,24 @@ def test_what_constraints_leave_open_stays_open():
     plain, along = np.diag([2.0, 3.0]), np.diag([np.inf, 0.0])
     found = _beyond_constraints(along, plain, 0.0)
     assert found[0, 0] == np.inf and found[1, 1] == pytest.approx(3.0)
+
+
+@one_blas_thread()
+def test_without_limits_an_arm_is_found_whatever_the_size_of_its_torques(tmp_path: Path):
+    """The solver's numbers were told in 1 N m and 1 rad/s, beside which the friction of a small drive is nothing."""
+
+    def found(scale: float, folder: str) -> ConsistentEstimate:
+        links = [replace(link, mass=scale * link.mass, inertia=tuple(scale * np.array(link.inertia))) for link in WRIST]
+        urdf = write_urdf(tmp_path / f"{folder}.urdf", links)
+        text = urdf.read_text().replace('<limit lower="-3" upper="3" effort="50" velocity="4"/>', "")
+        urdf.write_text(text.replace('type="revolute"', 'type="continuous"'))
+        model = build_model(load_robot(urdf))
+        value = parameters(model, model.robot.standard_parameters(), (2e-3 * scale, 1e-3 * scale))
+        return consistent(observed(model, moving(model.robot, seed=3, size=1.5), value, 2e-3, seed=3))
+
+    usual = found(1.0, "usual")
+    assert any(text.startswith("friction of") for text in usual.active)
+    for scale, folder in ((1e-6, "tiny"), (1e-3, "small"), (1e3, "large")):
+        other = found(scale, folder)
+        assert other.active == usual.active
+        assert np.all(np.abs(other.value / scale - usual.value) < 1e-2 * np.sqrt(np.diag(usual.covariance)))

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from scara_ident.errors import UsageError
 from scara_ident.estimation.consistent.constraints import Cone
 from scara_ident.estimation.consistent.friction import (
+    as_recorded,
     certificate,
     friction_faults,
     negative_ranges,
@@ -118,3 +119,16 @@ def test_without_a_velocity_limit_a_falling_law_pushes_in_the_end():
     (fault,) = friction_faults(polynomial(np.inf, np.inf), np.array([1.0, 0.0, 0.0, -1.0]))
     assert fault.start == pytest.approx(1.0)
     assert fault.stop == np.inf
+
+
+def test_without_limits_units_are_the_speed_and_the_friction_of_the_recordings():
+    v = np.linspace(-4.0, 4.0, 400)
+    factor = np.column_stack([np.sign(v) * np.abs(v) ** k for k in range(4)])
+    value = np.array([0.02, 0.01, 0.0, 0.0])
+    endless = as_recorded(polynomial(np.inf, np.inf), factor, value)
+    assert 2.0 < endless.usual_speed < 4.0
+    assert endless.usual_torque == pytest.approx(0.01 * endless.usual_speed + 1.0 / 20.0)
+    small = as_recorded(polynomial(np.inf, np.inf), 1e3 * factor, 1e-3 * value)
+    assert (small.usual_speed, small.usual_torque) == pytest.approx((endless.usual_speed, 1e-3 * endless.usual_torque))
+    # Of a joint that stood still nothing is known.
+    assert as_recorded(polynomial(np.inf, np.inf), 0.0 * factor, value) == polynomial(np.inf, np.inf)
