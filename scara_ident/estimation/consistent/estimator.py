@@ -16,7 +16,6 @@ from scara_ident.estimation.consistent.options import ConsistentOptions
 from scara_ident.estimation.consistent.problem import (
     DEPENDENT,
     MARGIN,
-    Point,
     Problem,
     Unknowns,
     declared,
@@ -144,7 +143,7 @@ def _estimate(
 ) -> ConsistentEstimate:
     u = problem.unknowns
     value = u.parameters(x)
-    free, labels = _free_directions(u, found.point)
+    free, labels = _free_directions(u, found)
     sizes = u.sizes(value)
     along = _half_along(information, free, sizes)
     inverse = along @ along.T
@@ -159,7 +158,7 @@ def _estimate(
             plain.information.regressor_factor.T @ (plain.information.regressor_factor @ plain.noise_bias)
         )
         covariance += np.outer(bias, bias)
-    held = _half_along(information, np.eye(len(value)), sizes).shape[1] - along.shape[1]
+    held = _half_along(information, np.diag(sizes), sizes).shape[1] - along.shape[1]
     if held > 0:
         apart = float(np.sum((information.regressor_factor @ (value - plain.value)) ** 2)) / held
         covariance = _beyond_constraints(covariance, plain.covariance, apart)
@@ -224,15 +223,19 @@ def _priors(u: Unknowns, options: ConsistentOptions) -> tuple[Information | None
     return on_model, StandardPrior(np.array(rows), np.array(target)) if rows else None
 
 
-def _free_directions(u: Unknowns, point: Point | None) -> tuple[Array, tuple[str, ...]]:
+def _free_directions(u: Unknowns, found: ConsistentSolution) -> tuple[Array, tuple[str, ...]]:
     """Return the directions in which the parameters can still move, shape (p, k), and what is active."""
     from scipy.linalg import null_space
 
-    free, labels = np.eye(u.size), tuple[str, ...]()
-    if point is not None:
-        whole = np.concatenate([point.x, point.auxiliary])
-        rows, labels = active_set(u.cones, whole, point.multipliers)
-        free = null_space(rows, rcond=DEPENDENT)[: u.size]
+    # As long as what they are about: columns of no unit of their own are told in 1 N m, also where torques are of millions.
+    length = np.ones(u.size)
+    length[u.rigid.stop :] = np.maximum(1.0, np.abs(found.x[u.rigid.stop :]))
+    free, labels = np.diag(length), tuple[str, ...]()
+    if found.point is not None:
+        whole = np.concatenate([found.point.x, found.point.auxiliary])
+        rows, labels = active_set(u.cones, whole, found.point.multipliers)
+        whole_length = np.concatenate([length, np.ones(len(found.point.auxiliary))])
+        free = length[:, None] * null_space(rows * whole_length, rcond=DEPENDENT)[: u.size]
     if len(u.held):
         free = free @ null_space(u.held @ free, rcond=DEPENDENT)
     return u.to_parameters @ free, labels

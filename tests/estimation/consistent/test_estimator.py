@@ -330,3 +330,39 @@ def test_without_limits_an_arm_is_found_whatever_the_size_of_its_torques(tmp_pat
         other = found(scale, folder)
         assert other.active == usual.active
         assert np.all(np.abs(other.value / scale - usual.value) < 1e-2 * np.sqrt(np.diag(usual.covariance)))
+
+
+@one_blas_thread()
+def test_how_sure_parameters_are_does_not_depend_on_the_units_of_length_and_mass(tmp_path: Path):
+    """In mm, with torques of millions, constraints took all of the variance, and an offset's was that of its neighbours."""
+
+    def found(length: float, mass: float, folder: str) -> ConsistentEstimate:
+        unit = mass * length**2
+        links = [
+            replace(
+                link,
+                mass=mass * link.mass,
+                xyz=tuple(length * np.array(link.xyz)),
+                com=tuple(length * np.array(link.com)),
+                inertia=tuple(unit * np.array(link.inertia)),
+            )
+            for link in WRIST
+        ]
+        urdf = write_urdf(tmp_path / f"{folder}.urdf", links)
+        urdf.write_text(urdf.read_text().replace('effort="50"', f'effort="{50.0 * unit!r}"'))
+        described = tmp_path / f"{folder}.yaml"
+        joints = ", ".join(f"j{k}: {{rotor_inertia: {0.01 * unit!r}}}" for k in (1, 2, 3))
+        described.write_text(
+            f"urdf: {urdf.name}\neffort_side: joint\njoints: {{{joints}}}\ngravity: [0, 0, {-9.81 * length!r}]\n"
+        )
+        model = build_model(load_robot(described))
+        value = parameters(model, model.robot.standard_parameters(), (0.2 * unit, 0.1 * unit))
+        value[[k for k, name in enumerate(model.names) if name.startswith("p_o")]] = 2.0 * unit
+        return consistent(observed(model, moving(model.robot, seed=3), value, 0.3, seed=3))
+
+    usual = found(1.0, 1.0, "usual")
+    assert any(text.startswith("friction of") for text in usual.active)
+    for length, mass, folder in ((1e3, 1.0, "mm"), (1e3, 1e3, "mm_g"), (1e-3, 1.0, "km")):
+        other = found(length, mass, folder)
+        expected = usual.value / np.sqrt(np.diag(usual.covariance))
+        np.testing.assert_allclose(other.value / np.sqrt(np.diag(other.covariance)), expected, rtol=0.02, atol=1e-3)
