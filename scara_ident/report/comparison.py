@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from scara_ident.arrays import Array
 from scara_ident.estimation.urdf_scale import scale_sentence
 from scara_ident.identification.compare import Comparison, TrajectorySummary
 from scara_ident.manners import listed
@@ -49,10 +50,10 @@ def comparison_dict(comparison: Comparison) -> dict[str, Any]:
         "predicted_by_covariance": _cells(comparison, comparison.expected),
         "normalised": _cells(comparison, comparison.errors / own[:, None]),
         "average_of_predicted": {
-            name: robot.by_joint(comparison.errors[i].mean(axis=0)) for i, name in enumerate(names)
+            name: robot.by_joint(_mean_known(comparison.errors[i])) for i, name in enumerate(names)
         },
         "average_of_estimated": {
-            name: robot.by_joint(comparison.errors[:, k].mean(axis=0)) for k, name in enumerate(names)
+            name: robot.by_joint(_mean_known(comparison.errors[:, k])) for k, name in enumerate(names)
         },
         "parameters": {
             summary.name: {
@@ -79,6 +80,15 @@ def _cells(comparison: Comparison, values: Any) -> dict[str, dict[str, dict[str,
         predicted: {estimated: robot.by_joint(values[i, k]) for k, estimated in enumerate(names)}
         for i, predicted in enumerate(names)
     }
+
+
+def _mean_known(errors: Array) -> Array:
+    """Return the mean error of each joint, (n,), over the trajectories in which it moves; NaN where it moves in none."""
+    known = np.isfinite(errors)
+    total = np.where(known, errors, 0.0).sum(axis=0)
+    mean: Array = np.full(errors.shape[1], np.nan)
+    np.divide(total, known.sum(axis=0), out=mean, where=known.any(axis=0))
+    return mean
 
 
 def _friction(comparison: Comparison) -> dict[str, Any]:

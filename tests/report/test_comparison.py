@@ -76,3 +76,15 @@ def test_of_fits_that_all_leave_a_parameter_open_none_is_best(clean):
     found = comparison_sentences(replace(clean, expected=np.full_like(clean.expected, np.inf)))
     assert not any("best" in sentence or "exceeds" in sentence for sentence in found)
     assert sum("not ranked" in sentence for sentence in found) == 3
+
+
+def test_a_joint_that_rests_in_a_trajectory_has_no_error_there_and_is_averaged_over_the_others(clean):
+    errors = clean.errors.copy()
+    errors[1, :, 1] = np.nan
+    content = comparison_dict(replace(clean, errors=errors))
+    assert content["average_of_estimated"]["A"]["joint2"] == pytest.approx(errors[[0, 2], 0, 1].mean())
+    assert np.isnan(content["average_of_predicted"]["B"]["joint2"])
+    assert "nan" not in text_of(*tables(content))
+    # Of one that rests in all of them nothing is known.
+    errors[:, :, 1] = np.nan
+    assert np.isnan(comparison_dict(replace(clean, errors=errors))["average_of_estimated"]["A"]["joint2"])

@@ -89,11 +89,12 @@ def tables(held: dict[str, Any]) -> list[Table]:
         for name in names:
             promised = held["predicted_by_covariance"][name]
             cells = [
-                f"{held['errors'][name][other][joint]:.3g} ({_known(promised[other][joint], 2)})" for other in names
+                f"{_known(held['errors'][name][other][joint], 3)} ({_known(promised[other][joint], 2)})"
+                for other in names
             ]
-            average = held["average_of_predicted"][name][joint]
-            rows.add_row(name, f"{held['torque_rms'][name][joint]:.3g}", *cells, f"{average:.3g}")
-        averages = [f"{held['average_of_estimated'][other][joint]:.3g}" for other in names]
+            average = _known(held["average_of_predicted"][name][joint], 3)
+            rows.add_row(name, f"{held['torque_rms'][name][joint]:.3g}", *cells, average)
+        averages = [_known(held["average_of_estimated"][other][joint], 3) for other in names]
         rows.add_row("average", "", *averages, "")
         found.append(rows)
     return found
