@@ -20,7 +20,7 @@ from scara_ident.model.terms.constraints import BrakingPolynomial
 
 Shape = Literal["dissipative", "lubricated"]
 
-# Distance that a solved polynomial keeps from 0 and from the limit, as a share of the limit: above what the solver
+# Distance that a solved polynomial keeps from 0 and from the limit, as a share of `torque_unit`: above what the solver
 # leaves of its constraints, below anything that friction can show.
 MARGIN = 1e-8
 # Share of a polynomial's size that rounding may leave of a root.
@@ -57,7 +57,7 @@ def certificate(polynomial: BrakingPolynomial, shape: Shape, margin: float = MAR
         ``lubricated``: that, and non-decreasing and concave in speed, as in lubricated gears beyond the Stribeck
         range (shear thinning).
     margin : float, optional
-        Distance kept from 0 and the limit, as a share of the limit.
+        Distance kept from 0 and the limit, as a share of `torque_unit`.
 
     Raises
     ------
@@ -66,11 +66,11 @@ def certificate(polynomial: BrakingPolynomial, shape: Shape, margin: float = MAR
     """
     finite = np.isfinite(polynomial.speed)
     powers = np.array(polynomial.powers)
-    unit = _torque(polynomial) / _speed(polynomial) ** powers
+    unit = torque_unit(polynomial) / _speed(polynomial) ** powers
     # Coefficients of 1, t, t^2, t^3 as functions of the unknowns, of the friction and of what it leaves of the limit.
     spread = np.zeros((4, len(powers)))
     spread[powers, np.arange(len(powers))] = 1.0
-    top = polynomial.limit / _torque(polynomial)
+    top = polynomial.limit / torque_unit(polynomial)
     sides = [(spread, np.array([-margin, 0.0, 0.0, 0.0]))]
     if finite and np.isfinite(top):
         sides.append((-spread, np.array([top - margin, 0.0, 0.0, 0.0])))
@@ -133,17 +133,24 @@ def _linear(matrix: Array, offset: Array, label: str) -> Cone:
 
 
 def _speed(polynomial: BrakingPolynomial) -> float:
-    return polynomial.speed if np.isfinite(polynomial.speed) else polynomial.usual_speed
+    """Return the speed in which powers are told: the velocity limit, else what is usual."""
+    if np.isfinite(polynomial.speed):
+        return polynomial.speed
+    return 1.0 if polynomial.usual_speed is None else polynomial.usual_speed
 
 
-def _torque(polynomial: BrakingPolynomial) -> float:
-    return polynomial.limit if np.isfinite(polynomial.limit) else polynomial.usual_torque
+def torque_unit(polynomial: BrakingPolynomial) -> float:
+    """Return the torque in which friction is told: what is usual, else the motor's limit."""
+    limit = polynomial.limit if np.isfinite(polynomial.limit) else np.inf
+    usual = limit if polynomial.usual_torque is None else min(limit, polynomial.usual_torque)
+    return float(usual) if np.isfinite(usual) else 1.0
 
 
 def as_recorded(polynomial: BrakingPolynomial, factor: Array, value: Array) -> BrakingPolynomial:
-    """Return a polynomial whose numbers are told in what recordings hold, where a limit is missing.
+    """Return a polynomial that knows how fast recordings are, and how large friction is in them.
 
-    The solver leaves its constraints off by a share of such a unit, which may be anything beside 1 N m and 1 rad/s.
+    The solver leaves its constraints off by a share of what numbers are told in. Friction may be anything beside 1 N m and
+    1 rad/s, and next to nothing beside the motor's limit.
 
     Parameters
     ----------

@@ -33,6 +33,7 @@ from scara_ident.arrays import Array
 from scara_ident.errors import EstimationError
 from scara_ident.estimation.consistent.bodies import PACKED_IDENTITY, unpack
 from scara_ident.estimation.consistent.constraints import Cone
+from scara_ident.estimation.consistent.friction import torque_unit
 from scara_ident.estimation.consistent.problem import Unknowns
 from scara_ident.model.terms import Offset
 
@@ -101,7 +102,9 @@ def _other_scales(u: Unknowns, rows: Array, target: Array) -> Array:
     torque = float(np.linalg.norm(target))
     scales = np.where(size > 0.0, torque / np.where(size > 0.0, size, 1.0), 1.0)
     column = np.argmax(u.to_parameters[:, 11 * u.n :] != 0.0, axis=0)
-    scales[np.isin(column, u.bounded)] = 1.0
+    for polynomial in u.polynomials:
+        if np.isfinite(polynomial.limit) and np.isfinite(polynomial.speed):
+            scales[np.isin(column, polynomial.columns)] = polynomial.limit / torque_unit(polynomial)
     for term in u.model.terms:
         if isinstance(term, Offset):
             place = u.model.place(term)

@@ -122,14 +122,6 @@ class Unknowns:
         total, rigid = self.size + self.auxiliary, np.arange(11 * self.n)
         return (*(cone.inside(MARGIN).at(rigid, total) for cone in self.arm), *self.others)
 
-    @property
-    def bounded(self) -> NDArray[np.intp]:
-        """Columns of the model whose scale is set by a torque limit and a velocity limit."""
-        return np.array(
-            [c for p in self.polynomials if np.isfinite(p.limit) and np.isfinite(p.speed) for c in p.columns],
-            dtype=np.intp,
-        )
-
     def sizes(self, value: Array) -> Array:
         """Return the size of each parameter, shape (p,): its change when the nominal arm doubles, or its value."""
         return np.asarray(np.maximum(np.linalg.norm(self.to_parameters, axis=1), np.abs(value)))

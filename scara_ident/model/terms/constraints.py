@@ -45,8 +45,8 @@ class BrakingPolynomial:
         Velocity limit of the joint, rad/s or m/s; infinite where it has none.
     limit : float
         Torque limit of the motor on the recorded side, N m or N; infinite where it has none.
-    usual_speed, usual_torque : float
-        What numbers are told in where there is no limit.
+    usual_speed, usual_torque : float or None
+        Of the recordings, where they are known.
     """
 
     joint: str
@@ -54,8 +54,8 @@ class BrakingPolynomial:
     powers: tuple[int, ...]
     speed: float
     limit: float
-    usual_speed: float = 1.0
-    usual_torque: float = 1.0
+    usual_speed: float | None = None
+    usual_torque: float | None = None
 
 
 Constraint = RealBodies | Nonnegative | BrakingPolynomial

@@ -366,3 +366,15 @@ def test_how_sure_parameters_are_does_not_depend_on_the_units_of_length_and_mass
         other = found(length, mass, folder)
         expected = usual.value / np.sqrt(np.diag(usual.covariance))
         np.testing.assert_allclose(other.value / np.sqrt(np.diag(other.covariance)), expected, rtol=0.02, atol=1e-3)
+
+
+@one_blas_thread()
+def test_an_arm_is_found_where_friction_is_next_to_nothing_beside_the_motors_limits(tmp_path: Path):
+    """Of 2 h of recordings whose friction pushed by many standard deviations none was, in shares of limits of 50 N m."""
+    model = build_model(load_robot(write_urdf(tmp_path / "wrist.urdf", WRIST)))
+    value = parameters(model, model.robot.standard_parameters(), (2e-3, -1e-3))
+    for k, name in enumerate(model.names):
+        value[k] += {"a2": -4e-4, "a3": 2e-4}.get(name[:2], 0.0)
+    found = consistent(observed(model, moving(model.robot, size=1.5), value, 1e-3, seed=1))
+    assert any(text.startswith("friction of") for text in found.active)
+    assert physical_consistency(found).possible

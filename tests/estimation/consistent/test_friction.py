@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -13,6 +15,7 @@ from scara_ident.estimation.consistent.friction import (
     friction_faults,
     negative_ranges,
     shape_faults,
+    torque_unit,
 )
 from scara_ident.model.terms import BrakingPolynomial
 
@@ -132,3 +135,20 @@ def test_without_limits_units_are_the_speed_and_the_friction_of_the_recordings()
     assert (small.usual_speed, small.usual_torque) == pytest.approx((endless.usual_speed, 1e-3 * endless.usual_torque))
     # Of a joint that stood still nothing is known.
     assert as_recorded(polynomial(np.inf, np.inf), 0.0 * factor, value) == polynomial(np.inf, np.inf)
+
+
+def test_friction_is_told_in_what_is_usual_of_it_where_that_is_known():
+    assert torque_unit(polynomial(2.0, 50.0)) == 50.0
+    assert torque_unit(polynomial(2.0, np.inf)) == 1.0
+    small = replace(polynomial(2.0, 50.0), usual_torque=0.01)
+    assert torque_unit(small) == 0.01
+    assert torque_unit(replace(small, limit=0.001)) == 0.001
+    # The same friction is allowed, whatever it is told in.
+    for each in (polynomial(2.0, 50.0), small):
+        found = certificate(each, "dissipative", margin=0.0)
+        for friction, possible in (
+            ([0.02, 0.01, 0.0, 0.0], True),
+            ([0.02, -0.02, 0.0, 0.0], False),
+            ([51.0, 0, 0, 0], False),
+        ):
+            assert (slack(found.cones, np.array(friction) / found.unit, found.auxiliary) > -1e-7) == possible
