@@ -12,7 +12,7 @@ from scara_ident.arrays import Array
 from scara_ident.errors import RobotError, ScaraIdentError, UsageError
 from scara_ident.excitation.clearance import Box, Clearance
 from scara_ident.excitation.tool import Tool, tool_motion, tool_of
-from scara_ident.excitation.watched_pairs import clearance_of
+from scara_ident.excitation.watched_pairs import UNWATCHED, clearance_of
 from scara_ident.model.model import TorqueModel
 from scara_ident.model.terms import Friction
 from scara_ident.motion.motion import Motion
@@ -180,8 +180,11 @@ def limits_of(
         raise UsageError("boxes without a clearance: nothing would be kept from them; give a clearance of 0 m or more")
     if clearance is not None:
         kept = clearance_of(robot, lower, upper, margin=clearance, floor=floor, boxes=boxes)
-        if boxes and not kept.pairs:
-            raise UsageError(f"boxes: {kept.notes[0]} Give the URDF collision shapes, or no boxes")
+        # A box that no link is ever clear of keeps nothing, as one whose numbers are in mm.
+        if boxes and not any(group.startswith("box") for *_, group in kept.pairs):
+            lacking = kept.notes[0].startswith(UNWATCHED)
+            advice = "Give the URDF collision shapes, or no boxes" if lacking else "Give boxes that the arm can leave"
+            raise UsageError(f"boxes: {' '.join(kept.notes)} {advice}")
         limits = replace(limits, clearance=kept)
     if limits.watches_tool or tool is not None:
         return replace(limits, tool=tool_of(robot, tool))

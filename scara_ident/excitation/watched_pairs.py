@@ -20,6 +20,8 @@ POSTURES = 100
 SPREAD = 0.5
 # Links of the arm that are never further apart than this touch by design, m.
 TOUCHING = 0.02
+# How a note begins that says why nothing at all is watched.
+UNWATCHED = "Collisions were not looked for"
 
 
 def clearance_of(
@@ -60,7 +62,7 @@ def clearance_of(
             raise UsageError(f"box at {centre} with edges {edges}: expected finite places and edges above 0, in m")
     kept = tuple((_triple(centre), _triple(edges)) for centre, edges in boxes)
     watched = Clearance(robot, float(margin), float(floor), kept, (), ())
-    unwatched = "Collisions were not looked for: {}; rehearse the motion slowly."
+    unwatched = UNWATCHED + ": {}; rehearse the motion slowly."
     try:
         shapes = shapes_about(robot, watched.floor, watched.boxes)
     except RobotError as error:
@@ -113,7 +115,7 @@ def _parted(watched: Clearance, lower: Array, upper: Array) -> Clearance:
     kept = tuple(pair for pair, never in zip(watched.pairs, touching, strict=True) if not never)
     room = distance[~touching].min(axis=1) - watched.margin
     likely = room < SPREAD * np.ptp(distance[~touching], axis=1)
-    said = f"Not kept {watched.margin:g} m apart, as they touch by design, or never: {{}}."
+    said = f"Not kept {watched.margin:g} m apart, as they touch by design, or are nearer in every posture: {{}}."
     notes = (*watched.notes, said.format("; ".join(left_out))) if left_out else watched.notes
     return replace(watched, pairs=kept, notes=notes, likely=tuple(likely.tolist()))
 

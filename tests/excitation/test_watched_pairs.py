@@ -57,9 +57,23 @@ def test_an_arm_without_shapes_or_with_lost_ones_says_so(tmp_path):
     robot = upright(tmp_path, "", "", "")
     with pytest.raises(UsageError, match="boxes: Collisions were not looked for"):
         limits_of(robot, boxes=[((1.0, 0.0, 0.0), (0.1, 0.1, 0.1))])
+    with pytest.raises(UsageError, match=r"no collision shapes.* Give the URDF collision shapes, or no boxes"):
+        limits_of(robot, boxes=[((1.0, 0.0, 0.0), (0.1, 0.1, 0.1))])
     with pytest.raises(UsageError, match="boxes without a clearance"):
         limits_of(robot, clearance=None, boxes=[((1.0, 0.0, 0.0), (0.1, 0.1, 0.1))])
     with pytest.raises(UsageError, match="clearance -1 m"):
         clearance_of(robot, *ENDS, margin=-1.0)
     with pytest.raises(UsageError, match="edges above 0"):
         clearance_of(robot, *ENDS, margin=0.0, boxes=[((1.0, 0.0, 0.0), (0.1, 0.0, 0.1))])
+
+
+def test_a_box_that_the_arm_can_never_leave_is_refused_for_that(tmp_path):
+    """It was said to lack collision shapes, or was left out with a note while all limits held."""
+    around = [((0.0, 0.0, 0.0), (50.0, 50.0, 50.0))]
+    for shapes in (("", BALL, ""), (BALL, BALL, BALL)):
+        robot = upright(tmp_path, *shapes)
+        with pytest.raises(UsageError, match=r"nearer in every posture: .*box1.* Give boxes that the arm can leave"):
+            limits_of(robot, boxes=around)
+    # One box that it is always in beside another, as a pedestal, is left out and said.
+    kept = limits_of(robot, boxes=[*around, ((1.5, 0.0, 1.0), (0.1, 0.1, 0.1))]).clearance
+    assert "box1" in kept.notes[0] and any(group == "box2" for *_, group in kept.pairs)
