@@ -375,6 +375,8 @@ class OnlineIdentifier:
             own = left[:, 0] * (left[:, 0] - columns @ new.solved_back(known[:, 0]))
             starts = np.cumsum([0, *map(len, parts[:-1])])
             squares = np.array([np.sum(own[a:b]) for a, b in zip(starts, [*starts[1:], None], strict=True)])
+            # A joint's part of that sum may be less than nothing where another joint's torque is far off, which a variance is not.
+            squares = np.maximum(squares, 0.0)
             self._noise = self._noise.after(self._noise.scale * squares, moving, self.settings.dependent)
             # Before so many rows inertias may still be far off.
             counts = np.where(self._noise.counted >= 2.0 * GIVEN_ROWS, moving, 0)

@@ -253,3 +253,15 @@ def test_of_a_band_that_goes_with_the_encoder_nothing_is_said(bits: int, band: f
     assert caplog.messages == []
     # Nor without a band, where nothing is filtered.
     assert OnlineIdentifier(model(), NOISE).notes == ()
+
+
+def test_a_torque_far_off_while_little_is_known_makes_no_variance_negative():
+    """The other joint's part of the innovations was less than nothing: roots of negative numbers, and a singular value that did not converge."""
+    for seed in range(8):
+        rng, states = np.random.default_rng(seed), signals(4.0)
+        effort = torque(states, truth(), seed=seed)
+        start = int(rng.integers(100, effort.shape[1] - 200))
+        effort[seed % 2, start : start + int(rng.integers(5, 200))] += 10.0 ** rng.uniform(1.0, 6.0)
+        online = fed(states[0], effort, replace(SETTINGS, band=20.0))
+        assert np.all(np.isfinite(online.value[online.determined]))
+        assert np.all(np.isfinite(online.std[online.determined]))

@@ -227,7 +227,7 @@ def _free_directions(u: Unknowns, found: ConsistentSolution) -> tuple[Array, tup
     """Return the directions in which the parameters can still move, shape (p, k), and what is active."""
     from scipy.linalg import null_space
 
-    # As long as what they are about: columns of no unit of their own are told in 1 N m, also where torques are of millions.
+    # As long as what they are about: columns of no unit of their own are in 1 N m, also where torques are of millions.
     length = np.ones(u.size)
     length[u.rigid.stop :] = np.maximum(1.0, np.abs(found.x[u.rigid.stop :]))
     free, labels = np.diag(length), tuple[str, ...]()

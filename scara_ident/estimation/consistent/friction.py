@@ -133,14 +133,14 @@ def _linear(matrix: Array, offset: Array, label: str) -> Cone:
 
 
 def _speed(polynomial: BrakingPolynomial) -> float:
-    """Return the speed in which powers are told: the velocity limit, else what is usual."""
+    """Return the speed that powers are scaled by: the velocity limit, else what is usual."""
     if np.isfinite(polynomial.speed):
         return polynomial.speed
     return 1.0 if polynomial.usual_speed is None else polynomial.usual_speed
 
 
 def torque_unit(polynomial: BrakingPolynomial) -> float:
-    """Return the torque in which friction is told: what is usual, else the motor's limit."""
+    """Return the torque that friction is scaled by: what is usual, else the motor's limit."""
     limit = polynomial.limit if np.isfinite(polynomial.limit) else np.inf
     usual = limit if polynomial.usual_torque is None else min(limit, polynomial.usual_torque)
     return float(usual) if np.isfinite(usual) else 1.0
@@ -149,7 +149,7 @@ def torque_unit(polynomial: BrakingPolynomial) -> float:
 def as_recorded(polynomial: BrakingPolynomial, factor: Array, value: Array) -> BrakingPolynomial:
     """Return a polynomial that knows how fast recordings are, and how large friction is in them.
 
-    The solver leaves its constraints off by a share of what numbers are told in. Friction may be anything beside 1 N m and
+    The solver leaves its constraints off by a share of the unit of its numbers. Friction may be anything beside 1 N m and
     1 rad/s, and next to nothing beside the motor's limit.
 
     Parameters
