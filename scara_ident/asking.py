@@ -194,7 +194,7 @@ def progress_in_words(folder: Path) -> str:
         for item in content.get("effects", ())
     ]
     said = f"found {', '.join(found)}" if found else "no effect found"
-    return f"So far: {content['verdict']}, {said}; all of it in {folder / 'report.html'}."
+    return f"So far: {content['verdict']}, {said}; the full report is {folder / 'report.html'}."
 
 
 def read_asked(folder: Path) -> Asked | None:
@@ -213,7 +213,7 @@ def read_asked(folder: Path) -> Asked | None:
         lists = {name: tuple(content.get(name, ())) for name in ("asked", "left_out")}
         return Asked(**{**content, **lists})
     except (ValueError, TypeError, AttributeError):
-        raise ScaraIdentError(f"{path}: not what ask writes; remove it to begin again") from None
+        raise ScaraIdentError(f"{path}: not a file that ask wrote; remove it to begin again") from None
 
 
 def _note(folder: Path, asked: Asked) -> Asked:
@@ -227,7 +227,7 @@ def _first(folder: Path, settings: Settings, asked: Asked, work: Work) -> Asked:
     design = design_excitation(
         model, duration=settings.duration, limits=settings.limits, effort=settings.effort, progress=_on_progress(work)
     )
-    words = "Nothing is recorded yet: record next/trajectory.csv, twice, into recordings/."
+    words = "There are no recordings yet: record next/trajectory.csv twice into recordings/."
     _written(folder, design)
     return _note(folder, replace(asked, state="record", words=words))
 
@@ -252,7 +252,7 @@ def _designed(folder: Path, settings: Settings, recordings: Sequence[Path], aske
     if not left:
         _removed(folder)
         tired = [item.text for item in inquiry.questions if asked.times.get(key_of(item), 0) >= MAX_REQUESTS]
-        words = f"Asked {MAX_REQUESTS} times and still open: {'; '.join(tired)}." if tired else "Nothing is open."
+        words = f"Asked {MAX_REQUESTS} times without an answer: {'; '.join(tired)}." if tired else "Nothing is open."
         return _note(folder, replace(asked, state="unanswered" if tired else "settled", words=words))
     inquiry = inquiry_of({**content, "next": [item.entry() for item in left]}, settings.robot, read)
     design = design_excitation(
@@ -268,12 +268,12 @@ def _designed(folder: Path, settings: Settings, recordings: Sequence[Path], aske
     if not worthwhile:
         _removed(folder)
         others = "; ".join(f"{item.question.text}: {item.remedy}" for item in design.tells)
-        words = f"No motion within the limits would tell. What would: {others}."
+        words = f"No motion within the limits answers the open questions. These experiments would: {others}."
         return _note(folder, replace(asked, state="unanswered", words=words))
     _written(folder, design)
     write_json(folder / "diagnosis.json", _promised(content, design.tells))
     words = (
-        f"Record next/trajectory.csv into recordings/. It asks: {worthwhile[0].question.text}; "
+        f"Record next/trajectory.csv into recordings/. It answers the question: {worthwhile[0].question.text}; "
         f"{worthwhile[0].before:.2g} standard errors apart so far, {worthwhile[0].after:.2g} expected with it."
     )
     keys = tuple(dict.fromkeys(key_of(item.question) for item in worthwhile))

@@ -2,19 +2,19 @@
 
 
 class ScaraIdentError(Exception):
-    """The data or the model cannot give what was asked (exit status 1)."""
+    """The data or the model cannot give the requested result (exit status 1)."""
 
     exit_status = 1
 
 
 class UsageError(ScaraIdentError):
-    """The command was called in a way it does not understand (exit status 2)."""
+    """The command was called with wrong arguments (exit status 2)."""
 
     exit_status = 2
 
 
 class ArgumentError(UsageError, TypeError):
-    """A function was given something of another kind than it takes."""
+    """A function got an argument of the wrong kind."""
 
 
 class RobotError(ScaraIdentError):
@@ -46,7 +46,7 @@ class RegressorMismatch(ScaraIdentError):
 
 
 class EstimationError(ScaraIdentError):
-    """An estimate that the information at hand does not allow."""
+    """An estimate that the available information does not determine."""
 
 
 class PluginWarning(UserWarning):

@@ -52,7 +52,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def test_what_the_diagnosis_came_to_is_told_in_a_line(tmp_path: Path):
+def test_what_the_diagnosis_came_to_is_reported_in_a_line(tmp_path: Path):
     content = {"verdict": "undecided", "model": "basic", "next": [], "effects": []}
     for effects, said in (
         ([], "no effect found"),
@@ -62,7 +62,9 @@ def test_what_the_diagnosis_came_to_is_told_in_a_line(tmp_path: Path):
         ),
     ):
         (tmp_path / "diagnosis.json").write_text(json.dumps({**content, "effects": effects}))
-        assert progress_in_words(tmp_path) == f"So far: undecided, {said}; all of it in {tmp_path / 'report.html'}."
+        assert (
+            progress_in_words(tmp_path) == f"So far: undecided, {said}; the full report is {tmp_path / 'report.html'}."
+        )
 
 
 @pytest.mark.slow
@@ -141,7 +143,7 @@ def test_where_no_motion_tells_it_says_the_experiment_of_what_stays_hidden(
     found = ask(folder, QUICK)
     assert found.state == "unanswered"
     assert found.words == (
-        f"No motion within the limits would tell. What would: what these hardly show: {faint.remedy}."
+        f"No motion within the limits answers the open questions. These experiments would: what these hardly show: {faint.remedy}."
     )
     assert general.suspects[0].candidate.effect.experiment in faint.remedy
     assert general.experiment not in faint.remedy
@@ -155,7 +157,7 @@ def test_where_nothing_is_open_it_says_so_and_no_motion_is_left(folder: Path, mo
     assert not (folder / "next" / "trajectory.csv").exists()
 
 
-def test_a_recording_that_cannot_be_used_is_told_each_time(folder: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_recording_that_cannot_be_used_is_reported_each_time(folder: Path, monkeypatch: pytest.MonkeyPatch):
     """It was left out, and only the notes of the diagnosis said so."""
     (folder / "recordings" / "junk_1.csv").write_text("a,b\n1,2\n", encoding="utf-8")
     monkeypatch.setattr(asking, "still_open", lambda *_: [])

@@ -116,7 +116,7 @@ def test_a_name_out_of_a_file_names_a_file_and_no_folder(tmp_path: Path, name: s
     assert [path.parent for path in tmp_path.iterdir()] == [tmp_path]
 
 
-def test_paths_that_are_none_are_told_and_rings_of_links_have_no_end(tmp_path: Path):
+def test_paths_that_are_none_are_reported_and_rings_of_links_have_no_end(tmp_path: Path):
     assert path_fault(tmp_path / "é") is None
     assert path_fault("a\0b") == "a?b: has a null byte in its name; correct the name"
     assert path_fault("a\udcff") == "a?: its name is not text in UTF-8; rename it"

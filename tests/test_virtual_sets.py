@@ -127,7 +127,7 @@ def test_runs_differ_only_where_they_are_said_to(sets: ModuleType, tmp_path: Pat
 
 
 @pytest.mark.parametrize("robot", ["scara03", "ur5"])
-def test_events_change_no_other_draw_and_are_told(sets: ModuleType, tmp_path: Path, robot: str) -> None:
+def test_events_change_no_other_draw_and_are_reported(sets: ModuleType, tmp_path: Path, robot: str) -> None:
     plain, met = (
         sets.simulate_set("none", 7, robot, tmp_path / str(events), small(sets, recordings=3, events=events))
         for events in (False, True)

@@ -21,22 +21,26 @@ if TYPE_CHECKING:
 
 @with_motion_limits
 def ask(
-    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="Holds recordings/; keeps all else.")],
+    folder: Annotated[
+        Path, typer.Argument(metavar="FOLDER", help="Folder with recordings/ in it; all results are kept there too.")
+    ],
     robot: options.Robot = None,
     model: options.Model = "complete",
-    duration: Annotated[float, typer.Option(min=1.0, max=3600.0, help="Of each asked motion, s.")] = 15.0,
+    duration: Annotated[float, typer.Option(min=1.0, max=3600.0, help="Duration of each motion to record, s.")] = 15.0,
     *,
     limits: Callable[[Robot], Limits],
-    starts: Annotated[int, typer.Option(min=1, help="Random starts of each design.")] = 8,
-    seed: Annotated[int, typer.Option(min=0, help="Of the random starts, and of the virtual arm.")] = 0,
-    virtual: Annotated[bool, typer.Option("--virtual", help="Let the virtual arm record what is asked for.")] = False,
+    starts: Annotated[int, typer.Option(min=1, help="Number of random starts of each design.")] = 8,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the random starts and of the virtual arm.")] = 0,
+    virtual: Annotated[bool, typer.Option("--virtual", help="Let the virtual arm record the motions.")] = False,
     effect: Annotated[
         list[str] | None,
-        typer.Option("--effect", metavar="NAME[:JOINT][:KEY=VALUE,..]", help="That the virtual arm has; repeatable."),
+        typer.Option(
+            "--effect", metavar="NAME[:JOINT][:KEY=VALUE,..]", help="Effect that the virtual arm has; may be repeated."
+        ),
     ] = None,
-    steps: Annotated[int, typer.Option(min=1, help="Motions that the virtual arm records at most.")] = 4,
+    steps: Annotated[int, typer.Option(min=1, help="Largest number of motions that the virtual arm records.")] = 4,
 ) -> None:
-    """Say what to record next: diagnose the recordings so far, and design the motion that settles what they leave open."""
+    """Diagnose the recordings so far, and design the next motion to record, which settles the questions they leave open."""
     from scara_ident.asking import Settings, beside_recordings, progress_in_words, recordings_in
     from scara_ident.asking import ask as run
     from scara_ident.errors import UsageError
@@ -45,18 +49,18 @@ def ask(
     from scara_ident.robot.robot import load_robot
 
     if effect and not virtual:
-        raise UsageError("--effect is what the virtual arm has; give --virtual with it")
+        raise UsageError("--effect is an effect of the virtual arm; give --virtual with it")
     if not folder.exists():
-        raise UsageError(f"{folder}: no such folder; make it, with recordings/ in it or empty for a first motion")
+        raise UsageError(f"{folder}: no such folder; create it, with recordings/ in it, or empty to get a first motion")
     if (folder / "recordings").is_file():
-        raise UsageError(f"{folder / 'recordings'}: is a file; recordings lie in a folder of that name")
+        raise UsageError(f"{folder / 'recordings'}: is a file; recordings must be in a folder of that name")
     check_output(folder)
     arm = load_robot(robot)
     within = limits(arm)
     settings = Settings(arm, model, duration, Effort(starts=starts, seed=seed), within)
     console = output_console()
     if not recordings_in(folder) and (aside := beside_recordings(folder)):
-        console.note([f"{aside[0].name} lies beside recordings/ and is not read: move recordings into it"])
+        console.note([f"{aside[0].name} is beside recordings/ and is not read: move it into recordings/"])
     made = 0
     while True:
         with progress() as work:

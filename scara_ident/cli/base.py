@@ -27,19 +27,19 @@ def base(robot: options.Robot = None, output: options.Output = None, json: optio
         value = "" if isnan(row["urdf"]) else f"{row['urdf']:.4g}"
         rows.add_row(row["name"], value, row["unit"], row["expression"])
     console.print(rows)
-    console.print(f"never enter the torque: {', '.join(content['never_enter']) or 'none'}")
-    console.print(f"enter only in sums: {', '.join(content['only_in_sums']) or 'none'}")
+    console.print(f"never appear in the torque: {', '.join(content['never_enter']) or 'none'}")
+    console.print(f"appear only in sums: {', '.join(content['only_in_sums']) or 'none'}")
     for row in content["approximate"]:
         console.print(
-            f"note: {row['name']} is regrouped though {row['share']:.1e} of its column is independent; "
-            "an angle in the URDF may have few digits"
+            f"note: {row['name']} is grouped with others though {row['share']:.1e} of its column is independent; an "
+            f"angle in the URDF may have too few digits"
         )
     check = content["check"]
     console.print(f"check: rank {check['rank']} of {content['count']}, torque unchanged to {check['torque_error']:.1e}")
     if check["rank"] < content["count"]:
         console.print(
-            f"note: {content['count'] - check['rank']} of the base parameters hardly differ from sums of others, and no motion tells "
-            "them apart; angles of few digits in the URDF do that: write 1.5707963267948966 for 1.57"
+            f"note: {content['count'] - check['rank']} of the base parameters are almost sums of others, and no motion "
+            f"distinguishes them; angles with few digits in the URDF cause this: write 1.5707963267948966 for 1.57"
         )
     if output is not None:
         write_json(output / "base.json", content)

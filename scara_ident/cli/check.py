@@ -13,7 +13,7 @@ from scara_ident.cli.console import READING_SHARE, check_report, progress, resul
 
 def check(
     trajectory: Annotated[
-        Path, typer.Argument(metavar="TRAJECTORY", help="trajectory.csv, or a recording, with effort or without.")
+        Path, typer.Argument(metavar="TRAJECTORY", help="trajectory.csv, or a recording with or without effort.")
     ],
     result: options.Result,
     robot: options.RobotMoved = None,
@@ -22,12 +22,13 @@ def check(
     accelerations: options.Accelerations = None,
     torques: options.Torques = None,
     powers: Annotated[
-        list[str] | None, typer.Option("--power", metavar="JOINT=P", help="Most that a drive gives or takes, W.")
+        list[str] | None,
+        typer.Option("--power", metavar="JOINT=P", help="Limit of the power that a drive gives or takes, W."),
     ] = None,
     output: options.Output = None,
     json: options.Json = False,
 ) -> None:
-    """Say whether an arm can run a motion, what limits it, and what energy it takes; exit status 1 if it cannot."""
+    """Say whether the arm can run a motion, which limit is nearest, and how much energy it takes; exit status 1 if it cannot."""
     from scara_ident.cli.joint_values import limits_by_joint
     from scara_ident.errors import ScaraIdentError
     from scara_ident.export.result import read_identified
@@ -49,7 +50,7 @@ def check(
     with progress() as work:
         work("reading the motion")
         motion = read_apart(lambda path: read_motion(path, known), trajectory)
-        work("looking at every limit", READING_SHARE)
+        work("checking every limit", READING_SHARE)
         found = run(known, motion, limits)
     content = check_dict(found)
     console = result_console(content, json)

@@ -15,7 +15,7 @@ def compare(
     json: options.Json = False,
     verbose: options.Verbose = False,
 ) -> None:
-    """Set every trajectory's parameters against every trajectory."""
+    """Fit the parameters to each trajectory, and predict every trajectory with them."""
     from scara_ident.cli.reading import read_beside
     from scara_ident.robot.robot import load_robot
 

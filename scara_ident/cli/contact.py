@@ -15,12 +15,17 @@ def contact(
     result: options.Result,
     free: Annotated[
         list[str],
-        typer.Option("--free", metavar="RECORDING", help="Without contact: thresholds are taken from it; repeatable."),
+        typer.Option(
+            "--free", metavar="RECORDING", help="Recording without contact, which sets the thresholds; may be repeated."
+        ),
     ],
     robot: options.RobotMoved = None,
-    rate: Annotated[float, typer.Option(metavar="R", min=1e-6, help="False alarms per hour to allow.")] = 1.0,
+    rate: Annotated[float, typer.Option(metavar="R", min=1e-6, help="Allowed false alarms per hour.")] = 1.0,
     bandwidth: Annotated[
-        float, typer.Option(metavar="HZ", min=0.01, help="Of the observer: wider is sooner, and noisier.")
+        float,
+        typer.Option(
+            metavar="HZ", min=0.01, help="Bandwidth of the observer: a wider one detects sooner and is noisier."
+        ),
     ] = 4.0,
     output: options.Output = None,
     json: options.Json = False,
@@ -41,8 +46,8 @@ def contact(
         with read_beside(arm, free, recordings) as wanted:
             (quiet, notes), (watched, more) = wanted()
         more += [
-            f"{other.path}: {share:.0%} of its samples are those of {first.path}, given as free of contact; a contact in it is in the "
-            "thresholds too, and may not be found"
+            f"{other.path}: {share:.0%} of its samples are those of {first.path}, given as free of contact; a contact in it would "
+            "raise the thresholds and may be missed"
             for other, first, share in shared_samples(quiet, watched)
         ]
         work("taking thresholds", READING_SHARE)

@@ -37,7 +37,7 @@ FLEET_RATE = 250.0
 
 def demo(
     output: options.Folder = Path("demo-output"),
-    seed: Annotated[int, typer.Option(min=0, help="Of noise and random starts.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the noise and of the random starts.")] = 1,
 ) -> None:
     """Run the whole story on the embedded arm: design, record, identify, compare, diagnose, ask, use, export, and a fleet."""
     from scara_ident.cli.ask import ask
@@ -58,41 +58,41 @@ def demo(
     check_output(output)
     for part in PARTS:
         if (output / part).is_symlink():
-            raise ScaraIdentError(f"{output / part}: a link, and results stay in {output}; take it away")
+            raise ScaraIdentError(f"{output / part}: is a link, but results must stay in {output}; remove it")
     console = output_console()
 
     def chapter(text: str) -> None:
         console.print(f"\n== {text}", style="bold")
 
     train, test = output / "train", output / "test"
-    chapter("What torque can tell of this arm")
+    chapter("The parameters that torque determines on this arm")
     base(output=output / "base")
-    chapter("The founding paper, printed against computed")
+    chapter("The tables of the original paper, printed and computed")
     paper_in_short(output / "paper")
-    chapter("A motion that tells more: 12 s within all limits")
+    chapter("A motion with better excitation: 12 s within all limits")
     excite(duration=[12.0], harmonics=10, starts=2, seed=seed, output=output / "excite")
-    chapter("Recordings of the virtual arm, with an effect that nobody declares")
+    chapter("Recordings of the virtual arm, with an effect that the model does not have")
     designed = str(output / "excite" / "trajectory.csv")
     simulate([designed, "OJD", "OJK", "CI"], effect=[HIDDEN], seed=seed, repetitions=2, output=train)
     simulate(["L1", "L2"], effect=[HIDDEN], seed=seed + 1, output=test)
-    chapter("Parameters, and torques that they were not fitted to")
+    chapter("Parameters, and their errors on held-out recordings")
     identify([str(train)], validate=[str(test)], method="consistent", output=output / "identify")
-    chapter("Every trajectory's parameters against every trajectory")
+    chapter("The parameters of each trajectory, tried on every trajectory")
     compare([str(train)], output=output / "compare")
     chapter("What the model lacks")
     found = output / "diagnose" / "diagnosis.json"
     diagnose([str(train)], validate=[str(test)], output=found.parent)
     console.print(f"The arm really had {HIDDEN}: see {train / 'OJD_1.truth.json'}.", soft_wrap=True)
-    chapter("What to record next, had but one motion been recorded")
+    chapter("What to record next, if only one motion had been recorded")
     simulate(["CI"], effect=[HIDDEN], seed=seed, repetitions=2, output=output / "ask" / "recordings")
     ask(output / "ask", duration=8.0, starts=1, seed=seed)
-    chapter("What the model wins, fed forward and in simulation")
+    chapter("What the model gains, as feed-forward and in simulation")
     use(found, recording=[str(test)], output=output / "use")
-    chapter("The arm as it was found, for a controller: one C header")
+    chapter("The identified arm for a controller: one C header")
     export(found, "c", output=output / "export")
     chapter("Three arms, a week apart: one of them has changed")
     if find_spec("distributed") is None:
-        console.print(f"Not shown: the engine of fleets is missing; {INSTALL}")
+        console.print(f"Not shown: the packages for fleets are missing; {INSTALL}")
     else:
         _record_fleet(output / "arms", seed)
         fleet(str(output / "arms"), output / "fleet")

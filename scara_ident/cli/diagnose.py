@@ -41,20 +41,20 @@ def diagnose(
         typer.Option(
             "--unloaded",
             metavar="RECORDING",
-            help="Recording known to be without payload; may be repeated. One to train on.",
+            help="Recording that is known to be without payload; the model is fitted to it too; may be repeated.",
         ),
     ] = None,
     effects: Annotated[
         str | None,
         typer.Option(
-            "--effects", metavar="NAME,...", callback=_known, help="Try only these effects; default: all there are."
+            "--effects", metavar="NAME,...", callback=_known, help="Try only these effects; default: all effects."
         ),
     ] = None,
     output: options.Output = None,
     json: options.Json = False,
     verbose: options.Verbose = False,
 ) -> None:
-    """Find what the model lacks, trace it to a physical effect, add it, report before and after."""
+    """Find what the model lacks, trace it to a physical effect, add the effect, and report the error before and after."""
     from scara_ident.cli.reading import read_beside
     from scara_ident.robot.robot import load_robot
 
@@ -119,9 +119,9 @@ def diagnose(
 
 @contextmanager
 def _drawn_meanwhile(result: Diagnosis) -> Iterator[tuple[DiagnosisContext, Callable[[], tuple[Picture, ...]]]]:
-    """Find out what the effects cost, and draw the pictures, in processes of their own meanwhile.
+    """Compute what the effects cost, and draw the pictures, in processes that run at the same time.
 
-    Yields what is made once for all that is printed and written, and what waits for the pictures.
+    Yields the context, which everything printed and written shares, and a function that waits for the pictures.
     """
     from scara_ident.export.identified_model import identified_model
     from scara_ident.processes import beside

@@ -26,55 +26,75 @@ def excite(
     model: options.ModelIfGiven = None,
     criterion: Annotated[
         Literal["logdet", "cond"] | None,
-        typer.Option(help="ln det (default) or the condition of the stacked regressor."),
+        typer.Option(help="ln det (default) or the condition number of the stacked regressor."),
     ] = None,
     wanted: Annotated[
         list[str] | None,
-        typer.Option("--for", metavar="NAME", help="Parameter or term to tell from all others; may be repeated."),
+        typer.Option(
+            "--for",
+            metavar="NAME",
+            help="Parameter or term to determine best, all others being unknown too; may be repeated.",
+        ),
     ] = None,
     tell: Annotated[
         Path | None,
         typer.Option(
-            metavar="DIAGNOSIS", help="diagnosis.json: the motion that best answers what it left open, of its model."
+            metavar="DIAGNOSIS",
+            help="diagnosis.json: design the motion that best answers the questions it left open, for its model.",
         ),
     ] = None,
     duration: Annotated[
         list[float] | None,
         typer.Option(
-            min=1.0, max=3600.0, help="Of each trajectory, s; repeated: of one after the other. [default: 25]"
+            min=1.0,
+            max=3600.0,
+            help="Duration of each trajectory, s; repeated: of the first, the second, ... [default: 25]",
         ),
     ] = None,
     harmonics: Annotated[
-        int | None, typer.Option(min=3, help="Per joint, of the longest trajectory; default: by the duration.")
+        int | None,
+        typer.Option(min=3, help="Harmonics per joint of the longest trajectory; default: from the duration."),
     ] = None,
-    family: Annotated[Literal["fourier", "spline"], typer.Option(help="Harmonics, or B-splines.")] = "fourier",
-    trajectories: Annotated[int, typer.Option(min=1, help="How many are designed together.")] = 1,
+    family: Annotated[
+        Literal["fourier", "spline"], typer.Option(help="fourier: harmonics; spline: B-splines.")
+    ] = "fourier",
+    trajectories: Annotated[int, typer.Option(min=1, help="Number of trajectories that are designed together.")] = 1,
     known: Annotated[
         list[str] | None,
-        typer.Option("--known", metavar="RECORDING", help="Recordings at hand: the design fills what they lack."),
+        typer.Option(
+            "--known",
+            metavar="RECORDING",
+            help="Recording that exists already: the design adds what it lacks; may be repeated.",
+        ),
     ] = None,
     asked_std: Annotated[
         list[str] | None,
         typer.Option(
             metavar="PERCENT|NAME=STD",
-            help="Say after which trajectory parameters are as sure as that; may be repeated.",
+            help="Say after which trajectory the parameters reach this standard deviation; may be repeated.",
         ),
     ] = None,
     noise: Annotated[
         list[str] | None,
-        typer.Option(metavar="JOINT=RMS", help="Of its torque below 50 Hz; default: the residual in --parameters."),
+        typer.Option(
+            metavar="JOINT=RMS", help="Noise of a joint's torque below 50 Hz; default: the residual in --parameters."
+        ),
     ] = None,
     parameters: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="identification.json to foresee torques with, friction included."),
+        typer.Option(
+            metavar="FILE", help="identification.json: its parameters, friction included, predict the torques."
+        ),
     ] = None,
     start: Annotated[
-        str | None, typer.Option(metavar="Q1,Q2,..", help="Positions of all joints to start at, rad or m.")
+        str | None, typer.Option(metavar="Q1,Q2,..", help="Start positions of all joints, rad or m.")
     ] = None,
     *,
     limits: Callable[[Robot], Limits],
-    seed: Annotated[int, typer.Option(min=0, help="Of the random starts.")] = 0,
-    starts: Annotated[int, typer.Option(min=1, help="Random starts; more take longer and may find better.")] = 8,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the random starts.")] = 0,
+    starts: Annotated[
+        int, typer.Option(min=1, help="Number of random starts; more take longer and may find a better motion.")
+    ] = 8,
     rate: Annotated[float, typer.Option(min=1.0, max=1e5, help="Samples per second of trajectory.csv.")] = 1000.0,
     output: options.Folder = Path("."),
     json: options.Json = False,
@@ -115,12 +135,12 @@ def excite(
 
     check_report(output, "excitation")
     if tell is not None and wanted:
-        raise UsageError("--for and --tell: two goals of one motion; give one of them")
+        raise UsageError("--for and --tell: these are two goals of one motion; give one of them")
     if tell is not None and (criterion is not None or model is not None):
         given = "--model" if criterion is None else "--criterion"
-        raise UsageError(f"{given} and --tell: the diagnosis says what is asked, and of which model; leave {given} out")
+        raise UsageError(f"{given} and --tell: the diagnosis sets the criterion and the model; leave {given} out")
     if tell is not None and asked_std:
-        raise UsageError("--asked-std and --tell: two goals of one motion; give one of them")
+        raise UsageError("--asked-std and --tell: these are two goals of one motion; give one of them")
     if noise and not asked_std:
         raise UsageError("--noise is for --asked-std; give both")
     asked = None if tell is None else read_diagnosis(tell)

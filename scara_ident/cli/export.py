@@ -25,7 +25,7 @@ def export(
     output: options.Folder = Path("."),
     json: options.Json = False,
 ) -> None:
-    """Write the identified arm for other programs, with what its error becomes there."""
+    """Write the identified arm for other programs, and report the held-out error of what was written."""
     from scara_ident.export.exported import export_model, said_lines, write_exported
     from scara_ident.export.result import read_identified
     from scara_ident.files import check_output

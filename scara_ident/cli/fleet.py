@@ -16,27 +16,29 @@ def fleet(
         str,
         typer.Argument(
             metavar="FOLDER",
-            help="Folder with a sub-folder for each arm, here or in an object store (s3://bucket/fleet); dates in the names of "
-            "files or their folders, as 2026-03-01.",
+            help="Folder with a sub-folder for each arm, local or in an object store (s3://bucket/fleet); the names of files or "
+            "of their folders hold the dates, such as 2026-03-01.",
         ),
     ],
     output: Annotated[
-        Path, typer.Option("--output", metavar="DIR", help="Folder for the results; a later run goes on there.")
+        Path, typer.Option("--output", metavar="DIR", help="Folder for the results; a later run continues from them.")
     ],
     robot: options.Robot = None,
     model: options.Model = "complete",
     scheduler: Annotated[
         str | None,
         typer.Option(
-            "--scheduler", metavar="ADDRESS", help="Dask scheduler, as tcp://host:8786; default: this machine."
+            "--scheduler", metavar="ADDRESS", help="Dask scheduler, such as tcp://host:8786; default: this machine."
         ),
     ] = None,
     workers: Annotated[
         int | None,
-        typer.Option("--workers", metavar="N", min=1, help="Processes on this machine; default: one for each core."),
+        typer.Option(
+            "--workers", metavar="N", min=1, help="Number of processes on this machine; default: one per core."
+        ),
     ] = None,
 ) -> None:
-    """Identify many arms over many dates, and say what changed in which, and since when."""
+    """Identify many arms on many dates, and say which arm changed, how, and since when."""
     from scara_ident.errors import ScaraIdentError
     from scara_ident.fleet import Settings, watch_fleet
     from scara_ident.fleet.table import fleet_table
@@ -55,7 +57,7 @@ def fleet(
     }
     said = ", ".join(f"{count} {kind}" for kind, count in counts.items() if count)
     console.print(f"{len(found.arms)} arms of {arm.name}: {said}", style="bold")
-    rows = table("arms by their need of a look", "arm", "what changed")
+    rows = table("arms, the most urgent first", "arm", "what changed")
     for item in found.ranked:
         for k, words in enumerate(item.sentences):
             rows.add_row("" if k else item.arm, words)
@@ -70,6 +72,6 @@ def fleet(
     console.written(output, "fleet.parquet", "report.html")
     if found.faults:
         raise ScaraIdentError(
-            f"{several(len(found.faults), 'fault')} in {folder}: {listed([str(fault) for fault in found.faults], 1)}; mend "
-            "and run again, all else is done"
+            f"{several(len(found.faults), 'fault')} in {folder}: {listed([str(fault) for fault in found.faults], 1)}; correct "
+            "this and run again, all other results are kept"
         )

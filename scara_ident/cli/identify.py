@@ -19,8 +19,9 @@ def identify(
     friction: Annotated[
         Literal["auto", "lubricated", "dissipative", "free"],
         typer.Option(
-            help="Friction of the method consistent. lubricated: takes energy out, grows and flattens; dissipative: takes "
-            "energy out; free: anything; auto: lubricated where the data do not contradict it, else dissipative."
+            help="Constraint on friction, with --method consistent. lubricated: dissipates energy, and grows less and less "
+            "with speed; dissipative: dissipates energy; free: no constraint; auto: lubricated if the data do not contradict "
+            "it, else dissipative."
         ),
     ] = "auto",
     validate: options.Validate = None,
@@ -29,13 +30,13 @@ def identify(
     json: options.Json = False,
     verbose: options.Verbose = False,
 ) -> None:
-    """Estimate the parameters from recordings and predict torques that were not fitted."""
+    """Estimate the parameters from recordings, and predict the torques of held-out recordings."""
     from scara_ident.cli.reading import read_beside
     from scara_ident.errors import UsageError
     from scara_ident.robot.robot import load_robot
 
     if friction != "auto" and method != "consistent":
-        raise UsageError(f"--friction {friction}: belongs to --method consistent; {method} holds friction to nothing")
+        raise UsageError(f"--friction {friction}: needs --method consistent; {method} does not constrain friction")
     check_report(output, "identification")
     arm = load_robot(robot)
     with progress() as work:

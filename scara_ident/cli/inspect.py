@@ -30,10 +30,13 @@ def inspect(
     ],
     urdf: Annotated[
         Path | None,
-        typer.Option("--urdf", metavar="URDF", help="The arm, or a name as ur5, to whose joints columns are matched."),
+        typer.Option(
+            "--urdf", metavar="URDF", help="URDF of the arm, or a name such as ur5; columns are matched to its joints."
+        ),
     ] = None,
     robot: Annotated[
-        Path | None, typer.Option("--robot", metavar="FILE", help="robot.yaml, to check its mapping on this file.")
+        Path | None,
+        typer.Option("--robot", metavar="FILE", help="robot.yaml whose column mapping is checked on this file."),
     ] = None,
     joints: Annotated[
         str | None,
@@ -44,7 +47,7 @@ def inspect(
     output: options.Output = None,
     json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
-    """Show what is in a file, guess which columns are the arm's, audit it and write a first robot.yaml."""
+    """Show what is in a file, guess which columns belong to the arm, audit the data and write a first robot.yaml."""
     from scara_ident.errors import ScaraIdentError, UsageError
     from scara_ident.files import check_output, write_text
     from scara_ident.inspection.inspection import inspect_file
@@ -141,9 +144,9 @@ def _show(console: PlainConsole, found: Inspection, written: Path | None) -> Non
     if written is not None:
         console.print(f"written: {written}; go through the lines marked STATE", soft_wrap=True)
     elif found.description is not None:
-        console.print("a first robot.yaml is written with --output DIR")
+        console.print("give --output DIR to write a first robot.yaml")
     elif recording is None and found.refusal is None:
-        console.print("with --urdf URDF columns are matched to the arm's joints and audited")
+        console.print("give --urdf URDF to match the columns to the arm's joints and to audit them")
 
 
 def _meaning(column: Any) -> str:

@@ -66,22 +66,22 @@ def program(
     """Identify the dynamic model of a robot arm from measured motion, and find what the model lacks."""
 
 
-# Each with a line for the list of commands that 80 columns do not cut.
+# Each with its line in the list of commands, short enough for 80 columns.
 _COMMANDS: tuple[tuple[Callable[..., Any], str], ...] = (
-    (identify, "Estimate the parameters from recordings, predict other torques."),
-    (diagnose, "Find what the model lacks, trace it to an effect, add that."),
-    (compare, "Set every trajectory's parameters against every trajectory."),
-    (excite, "Design a motion that tells much, within the arm's limits."),
+    (identify, "Estimate the parameters, predict torques of held-out recordings."),
+    (diagnose, "Find what the model lacks, trace it to an effect, add the effect."),
+    (compare, "Fit each trajectory, and predict every trajectory with the result."),
+    (excite, "Design an excitation trajectory within the arm's limits."),
     (export, "Write the identified arm for other programs."),
-    (check, "Say whether a motion can be run, and what it costs."),
-    (contact, "Find contact with the arm in recordings, and its force."),
+    (check, "Say whether the arm can run a motion, and the energy it takes."),
+    (contact, "Find contacts with the arm in recordings, and their forces."),
     (ask, "Say what to record next, and design that motion."),
     (simulate, "Record the virtual arm in closed loop."),
-    (use, "Say what the model wins as feed-forward and in simulation."),
-    (fleet, "Watch many arms over many dates, say what changed."),
+    (use, "Say what the model gains as feed-forward and in simulation."),
+    (fleet, "Identify many arms on many dates, say which changed and how."),
     (inspect, "Show what is in a file, audit it, write a first robot.yaml."),
     (base, "Print the base parameters: what each is made of."),
-    (paper, "Set the tables of Indri et al. beside what is computed."),
+    (paper, "Compare the tables of Indri et al. with the computed ones."),
     (demo, "Run the whole story on the embedded arm."),
 )
 for _command, _line in _COMMANDS:
@@ -89,9 +89,9 @@ for _command, _line in _COMMANDS:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run the program; every error is one line on stderr and an exit status."""
+    """Run the program; each error is one line on stderr and an exit status."""
     for stream in (sys.stdout, sys.stderr):
-        # A name that the terminal's encoding has no sign for is no reason to fail.
+        # A name that the terminal's encoding cannot show is no reason to fail.
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
     sys.exit(run(sys.argv[1:] if arguments is None else arguments))
@@ -99,12 +99,12 @@ def main(arguments: list[str] | None = None) -> None:
 
 @cache
 def _commands() -> Callable[..., Any]:
-    """Return the commands with their options, which to read off all functions takes longer than many a command."""
+    """Return the commands with their options; reading them from all functions takes longer than some commands."""
     return typer.main.get_command(app)
 
 
 def run(arguments: list[str]) -> int:
-    """Run the program and return its exit status: 0 done, 1 cannot be given, 2 bad usage."""
+    """Run the program and return its exit status: 0 done, 1 the data or model cannot give it, 2 bad usage."""
     try:
         with plugin_notices(), _ended_tidily():
             result = _commands()(args=arguments, prog_name="scara-ident", standalone_mode=False)
@@ -138,13 +138,13 @@ def run(arguments: list[str]) -> int:
         _complain("out of memory; give fewer recordings at a time, or shorter ones")
         return 1
     except OSError as error:
-        # Results say themselves what they are: this is what is printed, or what a library keeps.
+        # Errors of writing results name their file. Without a name it is what is printed, or a library's temporary file.
         full = error.errno in (errno.ENOSPC, errno.EDQUOT)
         where = error.filename or ("standard output or a temporary file" if full else None)
         _complain(f"{'' if where is None else f'{where}: '}{error.strerror or error}{'; make room' if full else ''}")
         return 1
     except Exception as error:
-        # A fault of ours, or of a package that adds to it: one line for the user, the whole trace for who wants to report it.
+        # A fault of the program or of an added package: one line for the user, the whole trace for a report.
         if os.environ.get("SCARA_IDENT_TRACEBACK"):
             raise
         what = f"{type(error).__name__}: {' '.join(str(error).split())}"
@@ -152,19 +152,21 @@ def run(arguments: list[str]) -> int:
         if package is None:
             _complain(f"internal error, {what}; please report it with what SCARA_IDENT_TRACEBACK=1 prints")
         else:
-            _complain(f"{package} failed with {what}; mend it or leave it out (SCARA_IDENT_TRACEBACK=1 says more)")
+            _complain(
+                f"{package} failed with {what}; correct the package or remove it (SCARA_IDENT_TRACEBACK=1 prints more)"
+            )
         return 1
 
 
 @contextmanager
 def _ended_tidily() -> Iterator[None]:
-    """Have the signal to end undo what is unfinished, as Ctrl-C does; a handler that is already there stays."""
+    """Clean up unfinished files on SIGTERM, as on Ctrl-C; a handler that is already set is kept."""
     if signal.getsignal(signal.SIGTERM) is not signal.SIG_DFL or current_thread() is not main_thread():
         yield
         return
 
     def end(*_: object) -> NoReturn:
-        # Once: what is undone then shall be undone to its end.
+        # Once only, so that a second signal does not stop the clean-up.
         signal.signal(signal.SIGTERM, signal.SIG_IGN)
         raise SystemExit(TERMINATED)
 

@@ -19,7 +19,7 @@ Recordings = Annotated[
     list[str],
     typer.Argument(
         metavar="RECORDING...",
-        help="Recordings (.parquet, .csv, .mat, .npz, .h5, .mcap, .db3, a rosbag2 folder), folders or globs of them.",
+        help="Recordings (.parquet, .csv, .mat, .npz, .h5, .mcap, .db3, a rosbag2 folder), or folders or globs of recordings.",
     ),
 ]
 Result = Annotated[Path, typer.Argument(metavar="RESULT", help="identification.json or diagnosis.json of this arm.")]
@@ -28,7 +28,7 @@ Robot = Annotated[
     typer.Option(
         "--robot",
         metavar="FILE",
-        help="robot.yaml, a URDF, or a robot of example-robot-data by its name, as ur5; default: the embedded SCARA03.",
+        help="robot.yaml, a URDF, or the name of a robot of example-robot-data, such as ur5; default: the embedded SCARA03.",
     ),
 ]
 RobotOfEarlier = Annotated[
@@ -36,8 +36,8 @@ RobotOfEarlier = Annotated[
     typer.Option(
         "--robot",
         metavar="FILE",
-        help="robot.yaml, a URDF, or a robot of example-robot-data by its name, as ur5; default: that of --tell or "
-        "--parameters, else the embedded SCARA03.",
+        help="robot.yaml, a URDF, or the name of a robot of example-robot-data, such as ur5; default: the robot of --tell "
+        "or --parameters, else the embedded SCARA03.",
     ),
 ]
 RobotMoved = Annotated[
@@ -45,7 +45,7 @@ RobotMoved = Annotated[
     typer.Option(
         "--robot",
         metavar="FILE",
-        help="Where the robot of the result is now, if its URDF has moved; default: that of the result.",
+        help="New place of the robot's URDF or robot.yaml, if it was moved; default: the place that the result names.",
     ),
 ]
 Model = Annotated[
@@ -81,65 +81,87 @@ Method = Annotated[
         metavar="NAME",
         callback=ESTIMATORS.check,
         autocompletion=ESTIMATORS.names,
-        help="Estimator: {methods}. wls weighs each joint by its residual, ols not at all; consistent: an arm that can "
-        "exist, weighted.",
+        help="Estimator: {methods}. wls: each joint is weighted by its residual; ols: all rows count the same; consistent: "
+        "weighted, and the parameters are physically consistent.",
     ),
 ]
 Band = Annotated[
     float | None,
-    typer.Option("--band", metavar="HZ", min=1e-3, help="Low-pass for all joints; default: chosen from the data."),
+    typer.Option(
+        "--band", metavar="HZ", min=1e-3, help="Low-pass cutoff for all joints; default: chosen from the data."
+    ),
 ]
 Validate = Annotated[
-    list[str] | None, typer.Option("--validate", metavar="RECORDING", help="Recording held out; may be repeated.")
+    list[str] | None, typer.Option("--validate", metavar="RECORDING", help="Held-out recording; may be repeated.")
 ]
-Output = Annotated[Path | None, typer.Option("--output", metavar="DIR", help="Folder for the results; made if needed.")]
-Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on stdout, and nothing else there.")]
-Verbose = Annotated[bool, typer.Option("--verbose", help="Also list what every file holds and what its audit found.")]
+Output = Annotated[
+    Path | None, typer.Option("--output", metavar="DIR", help="Folder for the results; created if needed.")
+]
+Json = Annotated[bool, typer.Option("--json", help="Print the result on stdout as JSON only.")]
+Verbose = Annotated[
+    bool, typer.Option("--verbose", help="Also list the contents of every file and the findings of its audit.")
+]
 # Limits of motions.
 Ranges = Annotated[
-    list[str] | None, typer.Option("--range", metavar="JOINT=LOWER..UPPER", help="Instead of the URDF's, rad or m.")
+    list[str] | None,
+    typer.Option("--range", metavar="JOINT=LOWER..UPPER", help="Position limits, instead of the URDF's, rad or m."),
 ]
 Velocities = Annotated[
-    list[str] | None, typer.Option("--velocity", metavar="JOINT=V", help="Instead of the URDF's, rad/s or m/s.")
+    list[str] | None,
+    typer.Option("--velocity", metavar="JOINT=V", help="Velocity limit, instead of the URDF's, rad/s or m/s."),
 ]
 Accelerations = Annotated[
     list[str] | None,
-    typer.Option("--acceleration", metavar="JOINT=A", help="Instead of robot.yaml's, rad/s^2 or m/s^2."),
+    typer.Option(
+        "--acceleration", metavar="JOINT=A", help="Acceleration limit, instead of robot.yaml's, rad/s^2 or m/s^2."
+    ),
 ]
 Torques = Annotated[
     list[str] | None,
-    typer.Option("--torque", metavar="JOINT=T", help="Instead of the URDF's, on the recorded side, N m or N."),
+    typer.Option(
+        "--torque", metavar="JOINT=T", help="Torque limit, instead of the URDF's, on the recorded side, N m or N."
+    ),
 ]
 Jerks = Annotated[
-    list[str] | None, typer.Option("--jerk", metavar="JOINT=J", help="Instead of robot.yaml's, rad/s^3 or m/s^3.")
+    list[str] | None,
+    typer.Option("--jerk", metavar="JOINT=J", help="Jerk limit, instead of robot.yaml's, rad/s^3 or m/s^3."),
 ]
-Share = Annotated[float, typer.Option("--share", help="Share of every joint's limits to use, of those given here too.")]
+Share = Annotated[
+    float, typer.Option("--share", help="Share of every joint limit to use; it applies to limits given as options too.")
+]
 Floor = Annotated[
     float | None,
-    typer.Option("--floor", metavar="Z", help="Height that the tool, and links with shapes, stay above, m."),
+    typer.Option("--floor", metavar="Z", help="The tool, and links with collision shapes, stay above this height, m."),
 ]
 Boxes = Annotated[
     list[str] | None,
     typer.Option(
-        "--box", metavar="X,Y,Z,DX,DY,DZ", help="Obstacle: centre and edges in the base frame, m; repeatable."
+        "--box",
+        metavar="X,Y,Z,DX,DY,DZ",
+        help="Box-shaped obstacle: centre and edge lengths in the base frame, m; may be repeated.",
     ),
 ]
 Clearance = Annotated[
-    float, typer.Option("--clearance", metavar="D", help="Distance from links to one another and to obstacles, m.")
+    float,
+    typer.Option("--clearance", metavar="D", help="Least distance between links, and between links and obstacles, m."),
 ]
-Tool = Annotated[str | None, typer.Option("--tool", metavar="LINK", help="Link whose origin is the tool.")]
+Tool = Annotated[str | None, typer.Option("--tool", metavar="LINK", help="Link whose origin is the tool point.")]
 ToolAcceleration = Annotated[
     float | None,
-    typer.Option("--tool-acceleration", metavar="A", help="Most, m/s^2; default: 9 on the SCARA03, else no limit."),
+    typer.Option(
+        "--tool-acceleration",
+        metavar="A",
+        help="Limit of the tool's acceleration, m/s^2; default: 9 on the SCARA03, else no limit.",
+    ),
 ]
-ToolSpeed = Annotated[float | None, typer.Option("--tool-speed", metavar="V", help="Most, m/s.")]
+ToolSpeed = Annotated[float | None, typer.Option("--tool-speed", metavar="V", help="Limit of the tool's speed, m/s.")]
 
 Folder = Annotated[Path, typer.Option("--output", metavar="DIR", help="Folder for the results.")]
 
 MaxMemory = Annotated[
     float | None,
     typer.Option(
-        "--max-memory", metavar="GB", help="Most memory that reading a file may take; default: half of the machine's."
+        "--max-memory", metavar="GB", help="Limit of the memory for reading a file; default: half of the machine's."
     ),
 ]
 
@@ -179,11 +201,11 @@ def with_signature(run: Any, parameters: Sequence[Parameter]) -> Callable[..., A
 class Command(TyperCommand):
     """A command that refuses empty words, and whose help lists what the registries hold.
 
-    These are asked then only, as finding out takes time.
+    The registries are read only for the help, because reading them takes time.
     """
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Take the words of the command line: an empty one is nobody's wish, and as a path would be the current folder."""
+        """Parse the command line. An empty word is refused: as a path it would mean the current folder."""
         given, _, _ = self.make_parser(ctx).parse_args(args=list(args))
         for option in self.params:
             value = given.get(option.name or "")

@@ -16,7 +16,7 @@ _IN_FULL = ("Table 1", "Limits", "Torque rms from Table 5")
 
 
 def paper(output: options.Output = None) -> None:
-    """Set the printed tables of the paper (Indri et al., 2002) beside what the program computes."""
+    """Compare the printed tables of the paper (Indri et al., 2002) with what the program computes."""
     from scara_ident.paper import check_paper
 
     check_report(output, "paper")

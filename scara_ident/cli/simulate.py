@@ -23,20 +23,20 @@ def simulate(
             "--effect",
             metavar="NAME[:JOINT][:KEY=VALUE,..]",
             help="Effect to switch on, such as spring:joint2:stiffness=0.05 or push:force=20,from=4.2,duration=0.8,"
-            "direction=0/0/1,link=LINK; recording=NAME in that recording only. May be repeated.",
+            "direction=0/0/1,link=LINK; with recording=NAME it acts in that recording only. May be repeated.",
         ),
     ] = None,
     link_encoder: Annotated[
         list[str] | None,
         typer.Option(
-            "--link-encoder", metavar="JOINT", help="Joint with a second encoder behind its gear; repeatable."
+            "--link-encoder", metavar="JOINT", help="Joint with a second encoder behind its gear; may be repeated."
         ),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of noise and encoder zero.")] = 0,
-    repetitions: Annotated[int, typer.Option(min=1, help="Recordings of each trajectory.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the noise and of the encoder zeros.")] = 0,
+    repetitions: Annotated[int, typer.Option(min=1, help="Number of recordings of each trajectory.")] = 1,
     output: Annotated[Path, typer.Option("--output", metavar="DIR", help="Folder for the recordings.")] = Path("."),
 ) -> None:
-    """Record the virtual arm in closed loop, with what it really was in a JSON beside."""
+    """Record the virtual arm in closed loop, and write its true parameters and effects beside each recording as JSON."""
     from scara_ident.errors import UsageError
     from scara_ident.files import check_output, slug
     from scara_ident.manners import listed
@@ -52,14 +52,14 @@ def simulate(
     motions = [named_motion(word, arm.robot) for word in trajectory]
     for joint in link_encoder or ():
         arm.robot.joint_index(joint)
-    # Numbered apart they would be taken for repetitions of one motion.
+    # With different numbers they would count as repetitions of one motion.
     names = [slug(motion.name, "motion") for motion in motions]
     for name in names:
         if names.count(name) > 1:
             same = [word for word, other in zip(trajectory, names, strict=True) if other == name]
             raise UsageError(
-                f"{listed(same, 3)}: each would be recorded as {name}_1, in the place of the other; rename a file, or record "
-                "a motion more often with --repetitions"
+                f"{listed(same, 3)}: all would be written to the same file {name}_1; rename a file, or use --repetitions to record a "
+                "motion several times"
             )
     made = [f"{motion.name}_{run}" for motion in motions for run in range(1, repetitions + 1)]
     for each in effects:

@@ -14,24 +14,30 @@ from scara_ident.cli.console import check_report, progress, result_console, tabl
 def use(
     result: Annotated[
         Path,
-        typer.Argument(metavar="RESULT", help="identification.json or diagnosis.json of `identify` or `diagnose`."),
+        typer.Argument(
+            metavar="RESULT", help="identification.json or diagnosis.json, as written by `identify` or `diagnose`."
+        ),
     ],
     robot: options.RobotMoved = None,
     trajectory: Annotated[
         str | None,
         typer.Option(
-            "--trajectory", metavar="FILE", help="Motion to follow, a trajectory.csv; default: from pose to pose."
+            "--trajectory",
+            metavar="FILE",
+            help="Motion to follow, a trajectory.csv; default: a motion from pose to pose.",
         ),
     ] = None,
     recording: Annotated[
         list[str] | None,
-        typer.Option("--recording", metavar="RECORDING", help="Recording to simulate beside; may be repeated."),
+        typer.Option(
+            "--recording", metavar="RECORDING", help="Recording to compare a simulation with; may be repeated."
+        ),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of the motion and the arms drawn.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the motion and of the randomly drawn arms.")] = 0,
     output: options.Output = None,
     json: options.Json = False,
 ) -> None:
-    """Say what the model wins: fed forward on virtual arms, and in simulation beside recordings."""
+    """Say what the model gains: as feed-forward on virtual arms, and in simulation compared with recordings."""
     from scara_ident.cli.reading import read_beside
     from scara_ident.export.result import read_identified
     from scara_ident.files import write_json

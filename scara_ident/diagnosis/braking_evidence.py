@@ -35,8 +35,8 @@ def braking_evidence(
         if push is not None and not item.lacks and item.joint not in of_effects:
             force = f"{push.torque:.3g} ± {push.std:.1g} {robot.torque_unit(j)}"
             why = (
-                f"its friction pushes with {force} at {push.speed:.3g} {robot.position_unit(j)}/s, which none does: something "
-                "else goes with its speed, or effort is not what the description says"
+                f"its friction pushes with {force} at {push.speed:.3g} {robot.position_unit(j)}/s, which no friction "
+                f"does: another torque depends on its speed, or the effort is not what the description says"
             )
             item = replace(item, shown=False, by="", why=why, lacks=True)
         found.append(item)

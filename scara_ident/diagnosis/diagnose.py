@@ -58,7 +58,7 @@ _LOG = logging.getLogger(__name__)
 # Dependences that are handed on: further ones are pairs that only repeat the first.
 NAMED_DEPENDENCES = 12
 # Said where effects are estimated in a lower band than they were found in.
-QUIETER = "all is estimated below {:.2g} Hz: up to {:.2g} Hz, where it was found, the noise of the positions moves it by more than chance"
+QUIETER = "all parameters are estimated below {:.2g} Hz: up to {:.2g} Hz, the band of the search, the noise of the positions biases them by more than chance"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -68,7 +68,7 @@ class Diagnosis(Saved, reported_by="diagnosis"):
     Attributes
     ----------
     verdict : {"complete", "explained", "unexplained", "undecided"}
-        ``undecided``: what is left was not shown to be noise on every joint, nor to be anything else.
+        ``undecided``: the residual was neither shown to be noise on every joint nor shown to be something else.
     search : Search
         Every candidate tried, with its statistics.
     before, after : Estimate
@@ -81,7 +81,7 @@ class Diagnosis(Saved, reported_by="diagnosis"):
     tentative : tuple of TentativeEffect
         Worth a look, and not in it.
     evidence : tuple of Evidence
-        Per joint, whether what is left was shown to be noise.
+        Per joint, whether the residual was shown to be noise.
     aliases : tuple of Alias
         Effects that the model absorbs on any data.
     unexplained : Unexplained or None
@@ -89,11 +89,11 @@ class Diagnosis(Saved, reported_by="diagnosis"):
         What the remainder depends on, ranked.
     notes : tuple of str
     rotors : tuple of RotorInertia
-        Behind the gears that found effects depend on.
+        Rotors behind the gears that the effects found depend on.
     events : tuple of Event
-        What is local in time: left out of every fit, or in recordings that were held out.
+        What happens in a part of the time: left out of every fit, or in held-out recordings.
     bands_given : bool
-        Whether somebody chose the bands, so that further recordings do not widen them.
+        Whether the user chose the bands; further recordings then do not widen them.
     """
 
     verdict: Verdict
@@ -144,7 +144,7 @@ class Diagnosis(Saved, reported_by="diagnosis"):
 
     @property
     def not_predicted(self) -> tuple[str, ...]:
-        """Effects found that `predict` leaves out: they take more than a state, or were taken out of the recordings."""
+        """Effects found that `predict` leaves out: they need more than a state, or were corrected in the recordings."""
         within = {(term.name, term.joint) for term in self.after.model.terms if isinstance(term, EffectTerm)}
         corrected = [item for item in self.effects if (item.effect, item.joint) not in within]
         return (*self.after.prediction.left_out, *(item.label for item in corrected))
@@ -173,22 +173,23 @@ def diagnose(
     ----------
     robot : Robot
     recordings : sequence of Recording, or of path
-        Every choice is made on these.
+        Training recordings; every choice is made on these.
     model : str or TorqueModel, optional
         The base model, as in `identify`.
     validation : sequence of Recording, or of path, optional
-        Recordings that no choice sees; they are only predicted, before and after. Where an effect was found that acts in
-        some recordings only, the first third of each tells whether it acts there, and errors are of the rest.
+        Held-out recordings, which no choice uses; they are only predicted, without and with the effects. If an effect
+        acts in some recordings only, the first third of each held-out recording shows whether it acts there, and errors
+        are of the rest.
     unloaded : sequence of str, optional
         Names of those of ``recordings`` that are known to be without payload.
     bands : sequence of float or None, one per joint, optional
-        Low-pass on both sides; by default the widest band that any joint's data allow, for all joints.
+        Low-pass of both sides; default: the widest band that any joint's data allow, for all joints.
     catalogue : sequence of Effect, optional
-        Families to try, by default all that are built in or installed; a user's own can be among them.
+        Families to try; default: all that are built in or installed. It may contain your own effects.
     criteria : SelectionCriteria, optional
-        When an effect is believed.
+        Criteria for believing an effect.
     progress : callable, optional
-        Called with every step that begins and the share of the work done before it.
+        Called at the begin of every step with its name and the share of the work done.
 
     Returns
     -------
@@ -197,13 +198,14 @@ def diagnose(
     Raises
     ------
     UsageError
-        If a recording is both fitted and held out, one named as unloaded is not among those to fit, a band is no
-        frequency that the slowest recording carries, or the catalogue holds what is no effect.
+        If a recording is both fitted and held out, one named as unloaded is not among the training recordings, a band
+        is not positive or above half of the slowest sample rate, or the catalogue contains something that is no effect.
     RecordingError
         If none of the recordings can be used, or they have fewer rows than the model has parameters (one of several that
         cannot be used is left out with a note), or channels are not what the mapping says (see `channel_faults`).
     ScaraIdentError
-        If an effect has no finite columns on a joint, and ``catalogue`` names some; one of all is left out with a note.
+        If an effect of a given ``catalogue`` has no finite columns on a joint; an effect of the default catalogue is
+        left out with a note.
 
     Examples
     --------
@@ -249,7 +251,7 @@ def diagnose(
     task = SearchTask(base, families, criteria, searching(work, band_given=given), chosen)
     outcome, events = _without_events(task, observations, free=not given)
     reported = outcome if given else below_position_noise(task, outcome)
-    work("comparing what was found with what else it could be", task.progress.stop)
+    work("comparing the effects found with their alternatives", task.progress.stop)
     found = reported.search
     step, whole = replace(found.step, weights=reported.after.weights), _whole(reported)
     parameters = parameters_of_laws(whole) if whole.chosen else PhysicalParameters()
@@ -332,7 +334,7 @@ def _without_events(task: SearchTask, observations: Observations, *, free: bool)
     remaining = find_events(outcome.training, robust_fit(outcome.training).value)
     if same_events(events, remaining):
         return outcome, events
-    left("searching again without what is local in time")
+    left("searching again without the events")
     return select_model(replace(task, progress=left), without_events(observations, remaining), free=free), remaining
 
 
@@ -348,14 +350,14 @@ def _remarks(outcome: Outcome, parameters: PhysicalParameters) -> list[str]:
             ", in motor rad per metre (of a linear motor 2 pi over its pole pitch)" if robot.prismatic[place] else ""
         )
         notes.append(
-            f"{left.joint}: no reduction is stated, and of a motor behind a gear or a screw no ripple is looked for; "
-            f"state it in robot.yaml{of_slide}"
+            f"{left.joint}: no reduction is stated, so a ripple of a motor behind a gear or a screw cannot be looked "
+            f"for; state the reduction in robot.yaml{of_slide}"
         )
     elif left is not None and f"position of {left.joint}" in left.signals:
         criteria = found.step.criteria
         notes.append(
             f"{left.joint}: what repeats with the motor's angle is looked for from {criteria.lowest_order:g} to "
-            f"{criteria.highest_order:g} periods per motor turn; what is left may lie outside, as once per turn of the gear's output"
+            f"{criteria.highest_order:g} periods per motor turn; the rest may lie outside this range, such as once per turn of the gear's output"
         )
     if after.variation is not None:
         notes += after.variation.sentences(robot, None if left is None else left.joint)

@@ -96,7 +96,7 @@ def not_found(readings: Readings, effects: Sequence[FoundEffect]) -> list[str]:
     """Return in words what channels tell of effects that the fit did not find."""
     added = {(item.effect, item.joint) for item in effects}
     return [
-        f"{effect} of {joint} was not added, but a channel of its own tells {said(values)}"
+        f"{effect} of {joint} was not added, but a separate channel gives {said(values)}"
         for (effect, joint), values in readings.items()
         if (effect, joint) not in added
     ]
@@ -205,5 +205,7 @@ def uncounted_correction(found: Search, parameters: PhysicalParameters) -> str |
     if found.correction.of_each:
         found_parameters = f"{candidate.effect.description(found.scene, candidate.member)}: {found_parameters}"
     if not np.any(least):
-        return f"{found_parameters}, with what runs differ by counted: within {stds:g} standard deviations of none"
-    return f"{found_parameters}, with what runs differ by counted: less {stds:g} standard deviations, {small}"
+        return f"{found_parameters}; with the differences between runs counted, this is within {stds:g} standard deviations of zero"
+    return (
+        f"{found_parameters}; with the differences between runs counted, and less {stds:g} standard deviations, {small}"
+    )

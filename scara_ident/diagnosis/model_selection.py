@@ -33,7 +33,7 @@ from scara_ident.estimation.observations import Observations, observe
 from scara_ident.motion.prepared import PreparedData
 
 # Of what is suspected, and others may stand for.
-TOO_LITTLE = "{0.label} would remove {0.gain:.0%} of what is left, but the recordings hold too little of it to tell it from others"
+TOO_LITTLE = "{0.label} would remove {0.gain:.0%} of what is left, but the recordings excite it too little to distinguish it from other effects"
 
 
 def select_model(task: SearchTask, observations: Observations, *, free: bool) -> Outcome:

@@ -38,8 +38,8 @@ def possible_evidence(
         if worst is not None and not item.lacks and item.joint not in of_effects:
             column, value, std = worst
             why = (
-                f"{column.name} ({column.meaning}) would be {value:.3g} ± {std:.1g} {column.unit}, which no body and no rotor has: "
-                "something that the model lacks or the description has wrong is in it"
+                f"{column.name} ({column.meaning}) would be {value:.3g} ± {std:.1g} {column.unit}, which no body or "
+                f"rotor can have: it contains something that the model lacks, or the robot description is wrong"
             )
             item = replace(item, shown=False, by="", why=why, lacks=True)
         found.append(item)

@@ -82,7 +82,7 @@ def proxies(found: Outcome, criteria: SelectionCriteria) -> list[Decision]:
         excused = short and noisy and removal.removed >= criteria.min_of_repeatable * removal.beyond
         if short and (owner is None or owner in left) and not (excused and kept):
             share = max(0.0, removal.removed / removal.repeating) if removal.repeating > 0.0 else 0.0
-            why = f"it would remove {share:.0%} of what repeats, and most of the rest stays unexplained"
+            why = f"it would remove {share:.0%} of what repeats, and most of what repeats would stay unexplained"
             refused.append(decision.refused(why))
         elif kept and (excused or (found.unexplained and owner in (None, found.unexplained.joint))):
             once = _only_repeated(search.step, labels.index(decision.label), criteria)
@@ -161,4 +161,4 @@ def _only_repeated(step: SelectionStep, place: int, criteria: SelectionCriteria)
     p_value = examine_moments(step.without(place), step.chosen[place]).p_value
     if p_value * step.tried <= criteria.family_error:
         return None
-    return f"what is left repeats: with repetitions of a motion counted once p = {p_value:.1e}"
+    return f"what is left repeats: with the repetitions of a motion counted once, p = {p_value:.1e}"

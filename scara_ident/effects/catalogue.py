@@ -100,14 +100,14 @@ def available_effects() -> tuple[Effect, ...]:
 
 
 def effects_named(*names: str) -> tuple[Effect, ...]:
-    """Return the families of the given names, all that share one.
+    """Return the families of the given names; several families can share a name.
 
     Raises
     ------
     UsageError
-        If there is none of a name.
+        If there is no family of a name.
     ArgumentError
-        If one is no name.
+        If an argument is no string.
     ScaraIdentError
         If a package's effect cannot be used; the line names the package.
     """

@@ -23,16 +23,16 @@ NEIGHBOUR_REACH = 2
 class InertiaCoupling(Effect):
     """Inertia that two joints turn together: torque of one proportional to the other's acceleration, both ways.
 
-    A rotor or shaft that turns with the sum of two joints' motions, as where a wrist is driven through its neighbour,
-    has it beside what adds to each joint's own inertia. It has either sign, as the shaft turns with the sum or the
-    difference.
+    A rotor or shaft that turns with the sum of two joints' motions, such as in a wrist that is driven through its
+    neighbour, causes this torque, in addition to what it adds to each joint's own inertia. The sign is that of the sum
+    or difference with which the shaft turns.
     """
 
     name = "inertia_coupling"
-    summary = "inertia that the drive shares with {partner}"
-    coefficients = (Coefficient("inertia", "{inertia}", "inertia that {joint} shares with {partner}"),)
+    summary = "inertia that turns with this joint and with {partner}"
+    coefficients = (Coefficient("inertia", "{inertia}", "inertia that turns with both {joint} and {partner}"),)
     of_state = True
-    not_simulated = "the virtual arm's rotors turn with one joint each"
+    not_simulated = "each rotor of the virtual arm turns with one joint"
 
     def members(self, scene: Scene) -> tuple[Member, ...]:
         """Return the pairs of joints where the base model does not span it."""
@@ -57,8 +57,8 @@ class InertiaCoupling(Effect):
 class DriveCoupling(Effect):
     """A drive that also carries a share of another joint's torque.
 
-    Where the drive of joint k runs through joint j, as in wrists, or reacts on it, as a belt from the base does, j's
-    motor carries a share of k's joint torque. A leak between torque channels looks the same.
+    If the drive of joint k runs through joint j, as in wrists, or reacts on it, as a belt from the base does, j's motor
+    carries a share of k's joint torque. Crosstalk between torque channels looks the same.
     """
 
     name = "drive_coupling"
@@ -66,12 +66,12 @@ class DriveCoupling(Effect):
     coefficients = (
         Coefficient(
             "share", "1", "share of the torque of {partner} on {joint}, both at the joint",
-            largest=1.0, too_large="more than all of the other joint's torque would be shared",
+            largest=1.0, too_large="it would be more than the whole torque of the other joint",
         ),
     )  # fmt: skip
     follows_estimate = True
     of_state = True
-    not_simulated = "the virtual arm's motors drive one joint each"
+    not_simulated = "each motor of the virtual arm drives one joint"
 
     def members(self, scene: Scene) -> tuple[Member, ...]:
         """Return every joint with every neighbour."""

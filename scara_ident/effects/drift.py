@@ -45,13 +45,14 @@ DRIFT_STDS = 3.0
 class WarmUp(Effect):
     """Friction that is larger when a run starts: the steady friction times ``1 + share exp(-t/time_constant)``.
 
-    The column is the friction that the present estimate predicts, times ``exp(-t/time_constant)``. An estimate made
-    without the effect takes the mean over the run for the steady friction; with the estimate made with it, the
+    The column is the friction that the present estimate predicts, times ``exp(-t/time_constant)``. An estimate without
+    the effect takes the mean over the run as the steady friction; with an estimate that includes the effect, the
     coefficient is the share.
 
-    Where Coulomb friction alone falls so, or the friction that grows with speed alone, and that explains more than chance makes, it
-    is by that: the share is of that part, and ``speed_power`` 0 or 1 is among the parameters, the least power of speed that
-    warms up. Where two laws explain as much, parameters are no surer than what they differ by.
+    If only the Coulomb friction warms up, or only the friction that grows with speed, and this explains significantly
+    more, this law is used: the share is of that part, and ``speed_power`` 0 or 1, the least power of speed that warms
+    up, is among the parameters. If two laws explain as much, the difference between them is part of the standard
+    deviations.
 
     Attributes
     ----------
@@ -62,10 +63,10 @@ class WarmUp(Effect):
     part: Part = "all"
 
     name = "warm_up"
-    summary = "friction that falls as the run goes on"
+    summary = "friction that falls during a run (warm-up)"
     coefficients = (
         Coefficient(
-            "share", "1", "further {part} of {joint} at the start of a run, as a share",
+            "share", "1", "additional {part} of {joint} at the start of a run, as a share",
             "friction would be smaller when the run starts",
             LARGEST_WARM_UP_SHARE, f"friction would fall to less than a {1.0 + LARGEST_WARM_UP_SHARE:.0f}th in the run",
         ),
@@ -101,9 +102,9 @@ class WarmUp(Effect):
             return wrong
         least = max(float(value[0]) - DOUBT_STDS * float(std[0]), 0.0)
         if least / (1.0 + least) > FASTEST_WARM_UP * member.nonlinear[0]:
-            return f"friction would fall faster than by {FASTEST_WARM_UP:.0%} a second, which no gear warms up by"
+            return f"friction would fall faster than by {FASTEST_WARM_UP:.0%} a second, and no gear warms up so fast"
         late = member.nonlinear[0] > LONGEST_WARM_UP * scene.duration
-        return "the recordings are too short to see it end" if late else None
+        return "the recordings are too short to show where it ends" if late else None
 
     def other_laws(self) -> tuple[Effect, ...]:
         """Return the families by which other parts of the friction warm up."""
@@ -128,12 +129,12 @@ class WarmUp(Effect):
 
 
 class OffsetDrift(Effect):
-    """A torque offset that grows in the run: ``u = rate t``, t from the start of each recording."""
+    """A torque offset that grows during a run: ``u = rate t``, t from the start of each recording."""
 
     name = "offset_drift"
-    summary = "a torque offset that drifts in the run"
+    summary = "a torque offset that drifts during a run"
     coefficients = (
-        Coefficient("rate", "{torque}/s", "growth of the torque offset of {joint} in a run"),
+        Coefficient("rate", "{torque}/s", "drift rate of the torque offset of {joint} during a run"),
         Coefficient("start", "{torque}", "torque offset of {joint} at the start of a run"),
     )
     at_rest = True
@@ -153,9 +154,9 @@ class OffsetDrift(Effect):
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """Say so where it is a constant, or leaves the torque limit behind."""
         if len(value) > 1 and abs(value[0]) < DRIFT_STDS * std[0]:
-            return "it is an offset, which the model lacks, rather than a drift"
+            return "it is a constant offset, which the model lacks, and not a drift"
         if (abs(value[0]) - DOUBT_STDS * std[0]) * scene.duration > float(scene.robot.torque_limit[member.place]):
-            return "the offset would outgrow the torque limit"
+            return "the offset would become larger than the torque limit"
         return None
 
     def parameters(self, scene: Scene, member: Member, value: Array, covariance: Array) -> Mapping[str, Parameter]:

@@ -72,13 +72,13 @@ class BehindGear(Effect):
 
 
 class JointElasticity(BehindGear):
-    """An elastic gear with the encoder on the motor: the link lags by x.
+    """An elastic gear with the encoder on the motor: the link lags behind the motor by x.
 
-    The link swings in the gear, ``M_jj x'' + d x' + k x = tau_j`` with the torque tau_j that a rigid gear would pass
-    on, and its lag changes the torques of all joints, ``-M x''`` first (Spong 1987). Well below the frequency of that
-    swinging, x is ``tau_j / k``. The frequency, at which the link swings while its motor is held, is the nonlinear
-    parameter, which matters where it is not far above the band; the coefficient is ``1/stiffness`` whatever it is. A
-    base that yields about the first joint's axis does the same to the torques.
+    The link oscillates on the spring of the gear, ``M_jj x'' + d x' + k x = tau_j`` with the torque tau_j that a rigid
+    gear would transmit. Its lag changes the torques of all joints, mainly by ``-M x''`` (Spong 1987). Well below the
+    resonance frequency x is ``tau_j / k``. The nonlinear parameter is this frequency, at which the link oscillates with
+    its motor held; it matters if it is not far above the band. The coefficient is ``1/stiffness`` in any case. A base
+    that yields about the first joint's axis has the same effect on the torques.
     """
 
     name = "joint_elasticity"
@@ -86,7 +86,7 @@ class JointElasticity(BehindGear):
     coefficients = (
         Coefficient(
             "compliance", "{compliance}", "compliance of the gear of {joint}",
-            "no elastic gear: the link would run ahead of its motor",
+            "its compliance would be negative: the link would move ahead of its motor",
         ),
     )  # fmt: skip
     nonlinear = (
@@ -186,13 +186,15 @@ class JointElasticity(BehindGear):
             return wrong
         frequency, ratio = member.nonlinear
         if frequency < scene.band and _is_damped(ratio):
-            return f"within the band no resonance is seen at {frequency:.2g} Hz: what is damped so lags as a delay does"
+            return f"no resonance is seen within the band at {frequency:.2g} Hz: with so much damping it looks like a delay"
         usual = usual_link_inertia(scene, member.place)
         least = value[0] - DOUBT_STDS * std[0]
         if usual > 0.0 and least > 0.0:
             frequency = float(1.0 / np.sqrt(least * usual) / (2.0 * np.pi))
             if 2.0 * frequency < min(member.nonlinear[0], scene.band):
-                return f"so soft a gear would let the link swing at {frequency:.2g} Hz, which is not seen"
+                return (
+                    f"with so soft a gear the link would swing at {frequency:.2g} Hz, and no such oscillation is seen"
+                )
         return None
 
     def parameters(self, scene: Scene, member: Member, value: Array, covariance: Array) -> Mapping[str, Parameter]:
@@ -234,10 +236,10 @@ def _is_damped(ratio: float) -> bool:
 class Backlash(BehindGear):
     """Clearance between motor and link: ``q_link = q - width s(t)``, where s is one half on either flank.
 
-    When the torque through the gear changes its sign the link loses contact and flies freely, motor and link drifting
-    apart with the acceleration that the torque would have given, until it lands on the other flank without bouncing.
-    How long that takes depends on the width and on the bodies. The coefficient and the nonlinear parameter are that width.
-    It lives where the torque reverses, not where the speed does.
+    When the torque through the gear changes its sign, the link loses contact and moves freely: motor and link separate
+    with the acceleration that the torque would have caused, until the link lands on the other flank without bouncing.
+    The duration depends on the width and on the bodies. Both the coefficient and the nonlinear parameter are that
+    width. The effect acts where the torque reverses, not where the speed does.
     """
 
     name = "backlash"
@@ -249,7 +251,7 @@ class Backlash(BehindGear):
     )  # fmt: skip
     nonlinear = (NonlinearParameter("_flown_width", "{position}", 1e-5, LARGEST_WIDTH, of_length=True),)
     view = View("reversal", along=True, distance="width")
-    experiment = "reverse under little load, and look for the way within which no torque is needed"
+    experiment = "reverse under little load, and look for the travel in which no torque is needed"
 
     def scan(self, scene: Scene, joint: int) -> Iterable[tuple[float, ...]]:
         """Return three widths, and more of a joint that slides."""
@@ -260,7 +262,7 @@ class Backlash(BehindGear):
         """Say so of a clearance that anybody would have felt."""
         wrong = super().inadmissible(scene, member, value, std)
         if wrong is None and value[0] > LARGEST_WIDTH * scene.radian[member.place] + DOUBT_STDS * std[0]:
-            return f"a clearance of {value[0]:.2g} {scene.robot.position_unit(member.place)} would rattle by hand"
+            return f"a clearance of {value[0]:.2g} {scene.robot.position_unit(member.place)} could be felt by hand"
         return wrong
 
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:

@@ -71,7 +71,7 @@ def not_all_of_coulomb(
     if coulomb is None:
         return None
     if value[0] + DOUBT_STDS * std[0] < smallest * max(coulomb, 0.0):
-        return f"only a small part of the Coulomb friction would build up {builds_up}; all of it does"
+        return f"only a small part of the Coulomb friction would build up {builds_up}, but all of it must"
     if value[0] - DOUBT_STDS * std[0] > largest * max(coulomb, 0.0):
         return f"it would be more than {largest:g} times the Coulomb friction"
     return None
@@ -83,7 +83,7 @@ class AtLowSpeed(Effect):
     nonlinear = (NonlinearParameter("velocity", "{position}/s", 1e-4, 5.0),)
     of_state = True
     view = View("velocity")
-    experiment = "run at eight or more constant speeds, spaced by a constant factor down to creeping"
+    experiment = "run at eight or more constant speeds, each a constant factor below the one before, down to the slowest possible"
     # Velocities tried, as shares of the joint's largest speed.
     shares: ClassVar[tuple[float, ...]] = ()
 
@@ -102,7 +102,7 @@ class AtLowSpeed(Effect):
         """Say so where the joint is never fast against the velocity."""
         wrong = super().inadmissible(scene, member, value, std)
         if wrong is None and member.nonlinear[0] > WIDEST_STRIBECK * scene.speed[member.place]:
-            return "the joint is never fast against this speed"
+            return "the joint never moves much faster than this speed"
         return wrong
 
 
@@ -111,9 +111,9 @@ class Stribeck(AtLowSpeed):
     """More friction at low speed: ``u = amplitude sign(v) exp(-(v/velocity)^2)``.
 
     Armstrong-Helouvry, Dupont, Canudas de Wit (1994), "A survey of models, analysis tools and compensation methods",
-    with both exponents in use. Where ``exp(-|v|/velocity)`` explains more than chance makes, it is by that, and ``exponent`` 1
-    is among the parameters. Amplitude and velocity rest on the law: where both explain as much, they are no surer than what the two
-    differ by.
+    which has both exponents. If ``exp(-|v|/velocity)`` explains significantly more, this law is used and ``exponent`` 1
+    is among the parameters. Amplitude and velocity depend on the law: if both laws explain as much, the difference
+    between them is part of the standard deviations.
 
     Attributes
     ----------
@@ -127,7 +127,10 @@ class Stribeck(AtLowSpeed):
     summary = "more friction at low speed (Stribeck)"
     coefficients = (
         Coefficient(
-            "amplitude", "{torque}", "further friction of {joint} near rest", "friction would fall towards rest"
+            "amplitude",
+            "{torque}",
+            "additional friction of {joint} at low speed",
+            "friction would be smaller at low speed",
         ),
     )
     shares = STRIBECK_SHARES
@@ -173,7 +176,7 @@ class Stribeck(AtLowSpeed):
                 slope = slope + k * each * (ratio * velocity) ** (k - 1)
         if np.min(slope) < 0.0:
             return ""
-        return "; as a whole the friction never falls with speed: it may be one that grows ever less"
+        return "; the total friction never falls with speed: it may be friction that grows less and less with speed"
 
 
 class AsymmetricFriction(Effect):
@@ -187,7 +190,7 @@ class AsymmetricFriction(Effect):
     coefficients = (
         Coefficient(
             "viscous_difference", "{torque} s/{position}",
-            "viscous friction of {joint} in the drive's positive direction less that in the negative",
+            "viscous friction of {joint} in the drive's positive direction minus that in the negative",
         ),
     )  # fmt: skip
     of_state = True
@@ -203,7 +206,7 @@ class AsymmetricFriction(Effect):
         speed = float(scene.speed[member.place])
         friction = sum(a * speed**power for power, a in friction_of(scene, member.place).items())
         if 0.5 * speed * (abs(value[0]) - DOUBT_STDS * std[0]) > max(friction, 0.0):
-            return "friction would push in one direction"
+            return "friction would drive the joint in one direction"
         return None
 
 
@@ -221,7 +224,9 @@ class PositionDependentFriction(Sinusoid):
     )
     of_state = True
     view = View("position", along=True)
-    experiment = "run over the whole stroke at constant speed in both directions: half the difference is friction"
+    experiment = (
+        "run over the whole range at constant speed in both directions: half the difference of the torques is friction"
+    )
 
     def joints(self, scene: Scene) -> list[int]:
         """Return the joints with Coulomb friction that travel far enough."""
@@ -245,7 +250,11 @@ class PositionDependentFriction(Sinusoid):
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """Say so where friction does not brake at every position."""
         coulomb = friction_of(scene, member.place).get(0, 0.0)
-        return "friction would push at some position" if min_amplitude(value, std) > max(coulomb, 0.0) else None
+        return (
+            "friction would drive the joint at some positions"
+            if min_amplitude(value, std) > max(coulomb, 0.0)
+            else None
+        )
 
     def parameters(self, scene: Scene, member: Member, value: Array, covariance: Array) -> Mapping[str, Parameter]:
         """Return share and phase; the share's standard deviation leaves out that of a0."""
@@ -260,9 +269,9 @@ class PositionDependentFriction(Sinusoid):
 class FrictionCoupling(Effect):
     """Friction of a joint driven by another joint's velocity: ``u_j = viscous w + coulomb sign(w)``.
 
-    w is the other joint's velocity v_k, or, where one motor moves with two joints as in belt drives and wrists, the
-    sum or difference ``v_j + v_k``, ``v_j - v_k`` in the direction of the drive; the linear part in v_j then adds to
-    the joint's own viscous friction.
+    w is the other joint's velocity v_k. If one motor moves with two joints, as in belt drives and wrists, w is the sum
+    or difference ``v_j + v_k``, ``v_j - v_k`` in the direction of the drive; its linear part in v_j then adds to the
+    joint's own viscous friction.
     """
 
     way: Literal["other", "sum", "difference"] = "other"

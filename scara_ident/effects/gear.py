@@ -40,18 +40,20 @@ def second_order(share: float) -> float:
 class TransmissionLoss(Effect):
     """A share of the transmitted torque is lost in the gear, against the motion.
 
-    With the efficiency eta the motor sees tau_l / eta when it drives and tau_l eta when it is driven, which is
-    ``sqrt(1 + c^2) tau_l + c |tau_l| sign(v)`` with ``eta = sqrt(1 + c^2) - c`` and the transmitted torque tau_l, which
-    leaves out the own rotor's inertia. The first term is of second order; its c is a nonlinear parameter to which the
-    coefficient is tied: free, it would stand for a gain of this joint's torque.
+    With the efficiency eta the motor sees tau_l / eta when the motor drives the load and tau_l eta when the load drives
+    the motor. This is ``sqrt(1 + c^2) tau_l + c |tau_l| sign(v)`` with ``eta = sqrt(1 + c^2) - c`` and the transmitted
+    torque tau_l, which does not contain the joint's own rotor inertia. The first term is of second order; its c is a
+    nonlinear parameter to which the coefficient is tied. If it were free, it would act as a gain of this joint's
+    torque.
 
-    A load that swings fast about a small one loses the mean of its size, which is not the size of its mean: what the recorded torque
-    has beyond the low-pass of the positions is in the first term; without a torque it is left out.
+    If the load oscillates fast about a small mean, the loss follows the mean of its absolute value, which is not the
+    absolute value of its mean. Therefore the part of the recorded torque above the low-pass of the positions is
+    included in the first term; without a recorded torque it is left out.
     Hamon, Gautier, Garrec (2011), "New dry friction model with load- and velocity-dependence".
 
-    Where ``c |tau_l| sign(v)`` alone explains more than chance makes, as large where the gear is driven as where it drives, it is
-    by that, and ``loss_order`` 1 is among the parameters: for a second order that is not there a scale of this joint's torque
-    would make up.
+    If ``c |tau_l| sign(v)`` alone, with the same loss in both directions of power, explains significantly more, this
+    law is used and ``loss_order`` 1 is among the parameters. Otherwise a scale of this joint's torque would compensate
+    a second order that is not there.
 
     Attributes
     ----------
@@ -66,8 +68,8 @@ class TransmissionLoss(Effect):
     coefficients = (
         Coefficient(
             "loss_coefficient", "1", "share of the transmitted torque lost in {joint}",
-            "a gear cannot give energy: the lost share is negative",
-            LARGEST_LOSS_SHARE, "over three quarters of the torque would be lost",
+            "the lost share is negative, but a gear cannot give energy",
+            LARGEST_LOSS_SHARE, "more than three quarters of the torque would be lost",
         ),
     )  # fmt: skip
     nonlinear = (NonlinearParameter("_lost_share", "1", 0.0, LARGEST_LOSS_SHARE),)
@@ -124,7 +126,9 @@ class TransmissionLoss(Effect):
     def description(self, scene: Scene, member: Member) -> str:
         """Add the law where it is not that of the order 2."""
         return super().description(scene, member) + (
-            "" if self._has_gain else ", as large where it is driven as where it drives"
+            ""
+            if self._has_gain
+            else ", with the same loss whether the motor drives the load or the load drives the motor"
         )
 
     @property

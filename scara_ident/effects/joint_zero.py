@@ -31,17 +31,18 @@ LARGEST_OFFSET = 1.1 * np.pi
 
 
 class JointZero(Effect):
-    """A joint that stands ``offset`` further than recorded: ``u = Y(q + offset e_j, v, a) theta``.
+    """A joint whose true position is ``offset`` larger than recorded: ``u = Y(q + offset e_j, v, a) theta``.
 
-    Its home was set elsewhere, or its maker counts from another pose than the URDF. The torque is that of the links at the
-    joint's true position, whatever the size of the offset; of two joints with one each, what both do together, of second
-    order, is left out. Where base parameters take up the torque of any offset, as of the last joint, whose link seems to be
-    another, there is no such effect to be found, and the joint is listed among what the model absorbs.
+    Its home position was set differently, or its maker counts from another pose than the URDF. The torque is computed
+    at the joint's true position, whatever the size of the offset; if two joints have an offset, their joint
+    contribution of second order is left out. If base parameters absorb the torque of any offset, as for the last joint,
+    whose link then only seems to be different, the effect cannot be found, and the joint is listed among those that the
+    model absorbs.
     """
 
     name = "joint_zero"
-    summary = "a position of {joint} that has another zero than the URDF's"
-    coefficients = (Coefficient("offset", "{position}", "position of {joint} in the URDF less that recorded"),)
+    summary = "a zero position of {joint} that differs from the URDF's"
+    coefficients = (Coefficient("offset", "{position}", "position of {joint} in the URDF minus the recorded position"),)
     nonlinear = (NonlinearParameter("_offset", "{position}", -LARGEST_OFFSET, LARGEST_OFFSET, False),)
     all_joints = True
     at_rest = True
@@ -51,8 +52,8 @@ class JointZero(Effect):
     of_state = True
     view = View("position")
     experiment = (
-        "bring the joint to the URDF's zero, by its marks or by a level on its link, and read its position; or creep "
-        "through all of its range with the joints after it bent in several ways"
+        "bring the joint to the URDF's zero, by its marks or by a level on its link, and read its position; or move "
+        "slowly through its whole range with the outer joints in several positions"
     )
 
     def joints(self, scene: Scene) -> list[int]:

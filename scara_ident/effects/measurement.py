@@ -38,18 +38,20 @@ DELAY_STEP = 2e-5
 
 
 class TorqueSensorNonlinearity(Effect):
-    """A torque channel that is not straight: ``recorded = u + cubic u^3``.
+    """A nonlinear torque channel: ``recorded = u + cubic u^3``.
 
-    Above zero for a motor that saturates, so that its current says more than its torque; below zero for a channel
-    that compresses. The column is the cube of the predicted torque, which is exact once the prediction is that of
-    the model fitted together with it.
+    ``cubic`` is positive for a motor that saturates, so that its current is larger than its torque indicates, and
+    negative for a channel that compresses. The column is the cube of the predicted torque; it is exact once the
+    prediction comes from the model that was fitted together with it.
     """
 
     power: ClassVar[int] = 3
 
     name = "torque_sensor_nonlinearity"
     summary = "a torque measurement, or torque constant, that depends on the torque"
-    coefficients = (Coefficient("cubic", "1/{square}", "cube of the torque in what {joint} records"),)
+    coefficients = (
+        Coefficient("cubic", "1/{square}", "coefficient of the cubed torque in the recorded torque of {joint}"),
+    )
     at_rest = True
     follows_estimate = True
     fitted_first = True
@@ -78,19 +80,21 @@ class TorqueSensorNonlinearity(Effect):
         least = np.sign(value[0]) * max(abs(value[0]) - DOUBT_STDS * std[0], 0.0)
         for torque in _torque_range(scene, member.place):
             if np.isfinite(torque) and 1.0 + self.power * least * torque ** (self.power - 1) < 0.0:
-                return f"what is recorded would not grow with the torque up to {torque:.2g} {scene.robot.torque_unit(member.place)}"
+                return f"the recorded torque would not grow with the true torque up to {torque:.2g} {scene.robot.torque_unit(member.place)}"
         return None
 
 
 class BentTorqueSensor(TorqueSensorNonlinearity):
-    """A torque channel that bends one way: ``recorded = u + square u^2``.
+    """A torque channel with a quadratic error: ``recorded = u + square u^2``.
 
-    As where the torque constant, or a sensor's gain, depends on the sign of the torque. Of a joint whose load has one sign the
-    cube does nearly the same, and what it does not, others are taken for.
+    For example a torque constant, or a sensor's gain, that depends on the sign of the torque. On a joint whose load has
+    one sign the cubic law explains nearly the same, and other effects may be taken for the rest.
     """
 
     power = 2
-    coefficients = (Coefficient("square", "1/({torque})", "square of the torque in what {joint} records"),)
+    coefficients = (
+        Coefficient("square", "1/({torque})", "coefficient of the squared torque in the recorded torque of {joint}"),
+    )
 
 
 def _torque_range(scene: Scene, joint: int) -> tuple[float, float]:
@@ -111,17 +115,18 @@ def _torque_range(scene: Scene, joint: int) -> tuple[float, float]:
 class TorqueGainMismatch(Effect):
     """A torque scale that differs from that of the other joints: ``recorded = scale u``.
 
-    A scale that is wrong for all joints alike goes into all parameters; what two joints' torques say of the parameters
-    that they share tells the ratio of their scales, weakly, and of joints that share none, or rest, nothing does (`scale_groups`). The joints of
-    which none is named agree with one another. ``ratio`` is the joint's scale over that of the first joint that it shares parameters
-    with, whether or not that is found to differ too. Where it is, it is named itself, with the ratio of its scale to
-    that of the joints that are not named. Where two joints share parameters nothing tells which is wrong: the second is named.
+    A scale error that is common to all joints is absorbed by all parameters. Two joints whose torques depend on common
+    parameters determine the ratio of their scales, though weakly; joints without common parameters, or at rest, do not
+    (`scale_groups`). The joints that are not named agree with one another. ``ratio`` is the joint's scale divided by
+    that of the first joint with which it has common parameters, even if that joint differs too. That joint is then
+    named itself, with the ratio of its scale to that of the joints that are not named. If only two joints have common
+    parameters, it is not known which scale is wrong: the second is named.
     """
 
     name = "torque_gain_mismatch"
-    summary = "a torque scale of its own, given over the first joint's"
+    summary = "a torque scale that differs from the other joints', relative to the first joint's"
     coefficients = (
-        Coefficient("ratio_less_one", "1", "torque scale of {joint} over that of the joints that agree, less 1"),
+        Coefficient("ratio_less_one", "1", "torque scale of {joint} divided by that of the joints that agree, minus 1"),
     )
     follows_estimate = True
     of_state = True
@@ -132,8 +137,12 @@ class TorqueGainMismatch(Effect):
         """Say over whose scale it is given: two joints that both differ from the others may have the same."""
         first = _compared(scene, member)[0]
         if member.joint == first:
-            return "a torque scale of its own, given over that of the joints not named"
-        return f"a torque scale of its own, given over that of {scene.robot.joints[first]}" if first else self.summary
+            return "a torque scale that differs from the other joints', relative to that of the joints not named"
+        return (
+            f"a torque scale that differs from the other joints', relative to that of {scene.robot.joints[first]}"
+            if first
+            else self.summary
+        )
 
     def joints(self, scene: Scene) -> list[int]:
         """Return all joints whose scale another's tells; of two the second, as either explains what the other does."""
@@ -145,7 +154,7 @@ class TorqueGainMismatch(Effect):
         return (
             ""
             if len(_compared(scene, member)) > MAX_AMBIGUOUS_JOINTS
-            else "; of two joints nothing tells which one's is wrong"
+            else "; with two joints it is not known which scale is wrong"
         )
 
     def or_else_beside(self, member: Member, value: Array, others: Sequence[tuple[Effect, Member, Array]]) -> str:
@@ -156,7 +165,7 @@ class TorqueGainMismatch(Effect):
             passed = [effect.passes_on(other, size, driving) for driving in (1.0, -1.0)]
             drives, driven = ((1.0 + float(value[0])) / share - 1.0 if share else 0.0 for share in passed)
             if drives > 0.0 > driven:
-                return f"; or the gear loses {drives:.1%} of the torque where it drives and {-driven:.1%} where it is driven"
+                return f"; or the gear loses {drives:.1%} of the torque when the motor drives the load and {-driven:.1%} when the load drives the motor"
         return ""
 
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
@@ -178,7 +187,7 @@ class TorqueGainMismatch(Effect):
         spread = DOUBT_STDS * std[0]
         if 1.0 / LARGEST_MISMATCH - spread <= 1.0 + value[0] <= LARGEST_MISMATCH + spread:
             return None
-        return f"a torque scale {1.0 + value[0]:.3g} times that of other joints is no mismatch"
+        return f"a torque scale {1.0 + value[0]:.3g} times that of the other joints is too far from 1 for this effect"
 
     def parameters(self, scene: Scene, member: Member, value: Array, covariance: Array) -> Mapping[str, Parameter]:
         """Return the ratio: to the first joint's scale, of which ``value[1]`` says by how much it differs where it does."""
@@ -202,10 +211,9 @@ def _groups(scene: Scene) -> tuple[tuple[int, ...], ...]:
 class TimeDelay(Effect):
     """Effort that is recorded later than position: ``recorded(t) = u(t - delay)``, of all joints or of one.
 
-    To first order ``recorded = u - delay du/dt``. Terms of even order are out of phase with it, so that what is left
-    is ``delay^3/6``; shifting the data by what was found and looking again removes that too, which is done for the
-    delay of all joints. A delay of no more than a sample is a matter of how samples are taken, to correct but not to
-    name.
+    To first order ``recorded = u - delay du/dt``. Terms of even order are out of phase with it, so the remaining error
+    is ``delay^3/6``. Shifting the data by the delay found and estimating again removes this too; it is done for a delay
+    of all joints. A delay of at most one sample comes from the sampling: it is corrected but not counted as an effect.
     """
 
     name = "time_delay"
@@ -219,7 +227,7 @@ class TimeDelay(Effect):
     def or_else(self, scene: Scene, member: Member, value: Array) -> str:
         """Say which of both is late where the delay is negative."""
         return (
-            ": by less than nothing, so that the position is the later one, as behind a filter of its own"
+            ": the delay is negative, so the position is later than the effort, for example because of its own filter"
             if value[0] < 0.0
             else ""
         )
@@ -248,7 +256,7 @@ class TimeDelay(Effect):
         """Say so where no loop is that late."""
         longest = max(LONGEST_DELAY, LONGEST_DELAY_SAMPLES / scene.rate)
         if abs(value[0]) > longest + DOUBT_STDS * std[0]:
-            return f"a delay of {value[0]:.3g} s is longer than any measurement's"
+            return f"a delay of {value[0]:.3g} s is longer than any measurement has"
         return None
 
     def corrects_data(self, member: Member) -> bool:
@@ -268,10 +276,10 @@ class TimeDelay(Effect):
         if abs(float(value[0])) * scene.rate > SAMPLING:
             return None
         if member.joint is not None:
-            return "less than one sample: the place of a sample within its period"
+            return "less than one sample: it depends on where in its period a sample is taken"
         return (
-            f"effort and position are {float(value[0]) * 1e3:+.2g} ms apart, less than one sample, as when a sample is "
-            "held to the next"
+            f"effort and position are {float(value[0]) * 1e3:+.2g} ms apart, less than one sample, for example because "
+            f"each sample is held until the next"
         )
 
     def distinguished_from(self, scene: Scene, member: Member) -> tuple[tuple[Effect, Member], ...]:
@@ -294,11 +302,9 @@ class LateTurn(Effect):
     """
 
     name = "late_turn"
-    summary = "friction that jumps later than the velocity turns"
-    coefficients = (
-        Coefficient("step_delay", "{torque} s", "Coulomb friction of {joint} times by how much it is late"),
-    )
-    not_simulated = "it is no part of an arm"
+    summary = "friction that changes sign later than the velocity"
+    coefficients = (Coefficient("step_delay", "{torque} s", "Coulomb friction of {joint} times its delay"),)
+    not_simulated = "it is not a property of the arm"
 
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
         """Return what one unit of Coulomb friction lacks for each second that it is late."""

@@ -45,7 +45,7 @@ class PayloadChange(Effect):
     """A mass at the tool point that is there from some time in the run on; negative where it was put down."""
 
     name = "payload_change"
-    summary = "a payload taken up or put down in the run"
+    summary = "a payload picked up or put down during a run"
     coefficients = (Coefficient("mass", "kg", "mass at the tool from some time in the run on"),)
     nonlinear: ClassVar[tuple[NonlinearParameter, ...]] = (
         NonlinearParameter("time", "s", 0.0, np.inf, False, jumps=True),
@@ -78,21 +78,21 @@ class PayloadChange(Effect):
 
 @dataclass(frozen=True)
 class FreePayloadChange(PayloadChange):
-    """A body that the last link carries from some time in the run on, mounted anyhow.
+    """A body that the last link carries from some time in the run on, mounted in any way.
 
-    Its mass, first moments and inertia are columns as far as the torque shows them; what it shows of the mass beside
-    other combinations decides whether a mass is reported.
+    Its mass, first moments and inertia are columns as far as the torque determines them. A mass is reported only if the
+    torque determines it separately from the other parameters.
 
     Attributes
     ----------
     whole : bool
-        Whether all that the torque shows are columns, not only the few that tell most. What has so many imitates much: only
-        where the few are to be believed is the whole body tried in their place.
+        Whether all parameters that the torque determines are columns, or only the few most important ones. With so many
+        columns it can imitate other effects, so the whole body is tried only after the few columns passed the tests.
     """
 
     whole: bool = False
 
-    summary = "a payload of unknown mounting taken up or put down in the run"
+    summary = "a payload at an unknown place, picked up or put down during a run"
 
     def members(self, scene: Scene) -> tuple[Member, ...]:
         """Return instants spread over the longest run."""
@@ -146,25 +146,26 @@ class FreePayloadChange(PayloadChange):
 
 @dataclass(frozen=True)
 class PayloadOfRecordings(Effect):
-    """A body that the last link carries in some recordings and not in others, mounted anyhow.
+    """A body that the last link carries in some recordings and not in others, mounted in any way.
 
-    The recordings are grouped by their torque, see `groups_by_torque`; their group is a member's partner, a bit for each
-    recording in the order of the scene. Where all have the same payload the base model absorbs it, and nothing but a known
-    mass can tell it.
+    The recordings are grouped by their torque, see `groups_by_torque`; their group is a member's partner, a bit for
+    each recording in the order of the scene. If all recordings have the same payload, the base model absorbs it and
+    only a known mass can determine it.
 
     Attributes
     ----------
     unloaded : frozenset of str
         Recordings known to be without payload.
     at_tool : bool
-        Whether it is known to be a compact weight at the tool: on an arm with vertical axes its mass is then much surer.
+        Whether it is known to be a compact weight at the tool; on an arm with vertical axes its mass is then determined
+        much better.
     """
 
     unloaded: frozenset[str] = frozenset()
     at_tool: bool = False
 
     name = PayloadChange.name
-    summary = "a payload in {recordings}, not in the others"
+    summary = "a payload in {recordings} and not in the others"
     on_links = True
     view = PayloadChange.view
     experiment = PayloadChange.experiment
@@ -220,8 +221,8 @@ class PayloadOfRecordings(Effect):
             return None
         if value[0] < -SEEN_STDS * std[0]:
             if _short_of_body(self._determined(scene.robot), -value, std):
-                return "its mass would be negative, and no body taken off has such moments: these recordings differ by something else too"
-            return "its mass would be negative: these recordings carry less than the others, or differ by no body"
+                return "its mass would be negative, and no removed body has such moments: these recordings differ in something else too"
+            return "its mass would be negative: these recordings carry less than the others, or the difference is not a body"
         return _too_heavy(scene, float(value[0]), float(std[0]))
 
     def essential(self, scene: Scene, member: Member) -> slice:
@@ -251,8 +252,8 @@ class PayloadOfRecordings(Effect):
 class GravityCounterbalance(Sinusoid):
     """A spring or weight that balances a joint: ``u = a sin q + b cos q``.
 
-    Where gravity already turns with the same angle, as on the first joint of a planar arm or a shoulder right after a
-    vertical axis, the model absorbs it. It may pull either way.
+    If gravity already depends on the same angle, as on the first joint of a planar arm or on a shoulder directly after
+    a vertical axis, the model absorbs it. It may act in both directions.
     """
 
     name = "gravity_counterbalance"
@@ -264,7 +265,7 @@ class GravityCounterbalance(Sinusoid):
     amplitude_name = "torque"
     on_links = True
     of_state = True
-    not_simulated = "the virtual arm's springs are straight in the angle"
+    not_simulated = "the springs of the virtual arm are linear in the angle"
 
     def joints(self, scene: Scene) -> list[int]:
         """Return the revolute joints that gravity loads."""

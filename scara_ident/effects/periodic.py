@@ -78,8 +78,8 @@ class PerMotorTurn(Sinusoid):
 class TorqueRipple(PerMotorTurn):
     """A torque periodic in the motor's angle: ``u = amplitude sin(order theta_m + phase)``, theta_m = N q.
 
-    N has the gear's sign, and q is zero where the joint's position is. The phase is one for all recordings, as with
-    an encoder that knows its place in the turn.
+    N has the gear's sign, and q is zero at the zero of the joint's position. The phase is the same in all recordings,
+    as with an absolute encoder.
     """
 
     name = "torque_ripple"
@@ -87,7 +87,7 @@ class TorqueRipple(PerMotorTurn):
     watched = True
     coefficients = sine_and_cosine("ripple_{part}", "{part} of {order:g} times the motor's angle of {joint}")
     of_state = True
-    experiment = "move slowly at constant speed over several motor turns and record at a high rate"
+    experiment = "move slowly at constant speed over several motor turns, and record at a high rate"
 
     def description(self, scene: Scene, member: Member) -> str:
         """Say one period as one, and behind which reduction they would be a whole number: one that is not is often stated wrong."""
@@ -96,7 +96,7 @@ class TorqueRipple(PerMotorTurn):
         whole = round(order)
         if stated == 1.0 or not 1 <= whole <= max(ORDERS) or abs(order / whole - 1.0) < WHOLE_ORDER:
             return said
-        return f"{said}, which would be {whole} behind a reduction of {stated * order / whole:.4g}"
+        return f"{said}, which would be {whole} with a reduction of {stated * order / whole:.4g}"
 
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
         """Return sine and cosine of the order times the motor's angle."""
@@ -111,18 +111,18 @@ class TorqueRipple(PerMotorTurn):
 
 
 class EncoderEccentricity(PerMotorTurn):
-    """An encoder that errs periodically with the motor: it reads ``q + e``, ``e = amplitude sin(order theta_m + phase)``.
+    """An encoder error that is periodic with the motor's angle: it reads ``q + e``, ``e = amplitude sin(order theta_m + phase)``.
 
     The arm's torque is that of ``q - e`` with its derivatives. To first order in e it differs by
 
         du = -(du/dq e + du/dv e' + du/da e''),  e' = n v cos(..),  e'' = n a cos(..) - n^2 v^2 sin(..),  n = order N,
 
-    so that at constant speed it grows with the square of the speed, where a ripple stays as it is. All joints that
-    the joint's acceleration acts on feel it.
+    so that at constant speed it grows with the square of the speed, while a ripple stays the same. It changes the
+    torque of all joints on which the joint's acceleration acts.
     """
 
     name = "encoder_eccentricity"
-    summary = "an encoder that errs {order:.4g} times per motor turn"
+    summary = "an encoder error with {order:.4g} periods per motor turn"
     coefficients = sine_and_cosine(
         "encoder_{part}", "{part} of the error of {joint}'s encoder over the motor's turn", "{position}"
     )
@@ -133,8 +133,8 @@ class EncoderEccentricity(PerMotorTurn):
     orders = ENCODER_ORDERS
 
     def description(self, scene: Scene, member: Member) -> str:
-        """Say one time as once."""
-        return super().description(scene, member).replace(" errs 1 times ", " errs once ")
+        """Return the description, in the singular for one period."""
+        return super().description(scene, member).replace(" 1 periods ", " 1 period ")
 
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
         """Return the change of torque per amplitude of sine and of cosine."""
@@ -179,21 +179,22 @@ class EncoderEccentricity(PerMotorTurn):
         """Say so where an encoder would err by much of a turn."""
         at_motor = abs(float(scene.robot.reduction[member.place])) * max(member.nonlinear[0], 1.0)
         too_much = at_motor * min_amplitude(value, std) > LARGEST_ECCENTRICITY
-        return "no encoder errs by that much" if too_much else None
+        return "no encoder has so large an error" if too_much else None
 
 
 @dataclass(frozen=True)
 class Vibration(Sinusoid):
     """A torque periodic in time, whatever the arm does: ``u = amplitude sin(2 pi frequency t + phase)``.
 
-    t counts from the start of each recording, and the phase is one for all recordings: that holds for what starts
-    with the run, such as a controller's own oscillator, and then other recordings can speak for or against it. What
-    runs on its own has another phase in every recording. With ``free_phase`` every recording of the scene has its own
-    pair of columns; no recording then speaks for another, recordings outside the scene are not predicted, and the
-    amplitude is the rms over the recordings. `frequency_spectrum` sums power over recordings and so finds both.
+    t counts from the start of each recording, and the phase is the same in all recordings. This is right for a source
+    that starts with the run, such as an oscillator in the controller, and other recordings can then confirm or
+    contradict it. A source that runs independently has another phase in every recording. With ``free_phase`` every
+    recording of the scene has its own pair of columns; then no recording confirms another, recordings outside the scene
+    are not predicted, and the amplitude is the rms over the recordings. `frequency_spectrum` sums power over recordings
+    and finds both kinds.
 
-    There is no grid of frequencies: lines are as narrow as the recordings are long, and come from the spectrum of the
-    residual.
+    There is no grid of frequencies, because lines become narrower with longer recordings; candidates come from the
+    spectrum of the residual.
     """
 
     free_phase: bool = False
@@ -204,7 +205,7 @@ class Vibration(Sinusoid):
     nonlinear = (NonlinearParameter("frequency", "Hz", 0.05, 1000.0, False),)
     seeded_by = "frequency"
     view = View("frequency")
-    experiment = "record at rest with the drives on: what is periodic then does not come from the motion"
+    experiment = "record at rest with the drives on: what is then periodic does not come from the motion"
 
     def scan(self, scene: Scene, joint: int) -> Iterable[tuple[float, ...]]:
         """Return none: lines of the residual suggest them."""

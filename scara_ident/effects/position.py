@@ -21,8 +21,8 @@ from scara_ident.robot.robot import Robot
 class Spring(Effect):
     """A cable or hose that pulls a joint to a rest position: ``u = k (q - q0)``.
 
-    A model with a torque offset has the constant ``-k q0`` already. Then the rest position is that of a joint without
-    an offset, and no recording can tell how far that is from the truth: its standard deviation is infinite.
+    A model with a torque offset already contains the constant ``-k q0``. The rest position is then the one of a joint
+    without an offset, and no recording can determine its error: its standard deviation is infinite.
     """
 
     name = "spring"
@@ -40,7 +40,7 @@ class Spring(Effect):
     of_state = True
     watched = True
     view = View("position")
-    experiment = "hold still, or creep, at positions over the whole range: a spring grows with the way, a tilt follows the sine of the angle"
+    experiment = "hold still, or move very slowly, at positions over the whole range: a spring's torque grows with the angle, a tilt's follows the sine of the angle"
 
     def columns(self, scene: Scene, member: Member) -> tuple[Column, ...]:
         """Describe the deflection, and the constant where the model has no offset."""
@@ -81,7 +81,7 @@ class Spring(Effect):
 
     def description(self, scene: Scene, member: Member) -> str:
         """Say that an offset would look the same as another rest position."""
-        caveat = ", whose rest position holds if the joint has no torque offset"
+        caveat = "; the rest position is right only if the joint has no torque offset"
         return self.summary + ("" if offset_of(scene, member.place) is None else caveat)
 
     def or_else(self, scene: Scene, member: Member, value: Array) -> str:
@@ -89,30 +89,33 @@ class Spring(Effect):
         weight = abs(weight_along(scene.robot).get(member.place, 0.0)) * abs(scene.robot.row_scale[member.place])
         if not weight:
             return ""
-        return f"; or a rope, chain or cable of {float(value[0]) / weight:.3g} kg/m that hangs heavier the higher the joint is"
+        return f"; or a rope, chain or cable of {float(value[0]) / weight:.3g} kg/m whose hanging weight grows as the joint goes up"
 
 
 class RopeWeight(Spring):
-    """A rope, chain or cable that hangs on a joint which goes up and down, the more of it the lower the joint is.
+    """A rope, chain or cable whose hanging length grows as a vertical joint goes down.
 
-    Its torque is that of a mass ``-mass_per_length h`` on the joint, h the height, which a spring of negative stiffness would have: so
-    no spring explains it. A rope over a pulley leaves one side and comes onto the other, where a counterweight hangs: its mass per length
-    then counts twice. What hangs at position zero is part of the weight that the joint carries. One that hangs heavier the higher
-    the joint is, as a chain that lies on the floor, is a spring: no position tells the two apart.
+    Its force is that of a mass ``-mass_per_length h`` on the joint, h the height. A spring would need a negative
+    stiffness for this, so no spring explains it. If a rope runs over a pulley to a counterweight, it leaves one side
+    and adds to the other: its mass per length then counts twice. The part that hangs at position zero belongs to the
+    weight that the joint carries. If the hanging weight grows as the joint goes up, as with a chain that lies on the
+    floor, it cannot be distinguished from a spring.
     """
 
     name = "rope_weight"
-    summary = "a rope, chain or cable that hangs heavier on the joint the lower it is"
+    summary = "a rope, chain or cable whose hanging weight grows as the joint goes down"
     coefficients = (
         Coefficient(
-            "mass_per_length", "kg/m", "mass that comes onto {joint} as it goes down, by its way",
-            "it would hang lighter the lower it is, as on a spring",
+            "mass_per_length", "kg/m", "mass added to {joint} per length of downward motion",
+            "its weight would fall as the joint goes down, as with a spring",
         ),
     )  # fmt: skip
     watched = False
     view = View("position")
-    experiment = "hold still, or creep, at heights over the whole range; weigh a length of the rope, chain or cable"
-    not_simulated = "the virtual arm's springs pull to where they rest"
+    experiment = (
+        "hold still, or move very slowly, at heights over the whole range; weigh a length of the rope, chain or cable"
+    )
+    not_simulated = "the springs of the virtual arm pull to their rest position"
 
     def joints(self, scene: Scene) -> list[int]:
         """Return the joints that go up and down wherever the arm is."""

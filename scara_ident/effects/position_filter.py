@@ -40,7 +40,7 @@ class PositionFilter(Effect):
     follows_estimate = True
     beside_together = True
     smooth = True
-    not_simulated = "it is no part of an arm"
+    not_simulated = "it is not a property of the arm"
 
     def members(self, scene: Scene) -> tuple[Member, ...]:
         """Return that of all joints."""

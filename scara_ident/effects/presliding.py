@@ -32,8 +32,8 @@ class Presliding(Effect):
     """Coulomb friction that follows a state z instead of sign(v) (Dahl 1968).
 
     ``dz/dq = (1 - z sign(v))/presliding_distance``. The base model keeps ``a0 sign(v)``; the column is ``z - sign(v)``
-    and its coefficient comes out near a0. The state begins at zero: what came before is not known, and it is
-    forgotten over a few distances.
+    and its coefficient is close to a0. The state begins at zero because the earlier motion is not known; its influence
+    ends after a few distances.
     """
 
     name = "presliding"
@@ -41,7 +41,7 @@ class Presliding(Effect):
     coefficients = (
         Coefficient(
             "presliding", "{torque}", "Coulomb friction of {joint} that builds up over a distance",
-            "friction would be largest just after a reversal",
+            "friction would be largest directly after a reversal",
         ),
     )  # fmt: skip
     # Fits scatter evenly about it, and not about its logarithm.
@@ -50,7 +50,7 @@ class Presliding(Effect):
     )
     in_small_ways = True
     view = View("reversal", along=True, distance="presliding_distance")
-    experiment = "reverse often with small amplitude at two speeds: its memory is in the way gone, a delay's is in time"
+    experiment = "reverse often with small amplitude at two speeds: presliding depends on the distance travelled, a delay on time"
 
     def scan(self, scene: Scene, joint: int) -> Iterable[tuple[float, ...]]:
         """Return distances that the joint's travel holds many times."""
@@ -70,7 +70,7 @@ class Presliding(Effect):
         if wrong is not None:
             return wrong
         if member.nonlinear[0] > LONGEST_SHARE * scene.travel[member.place]:
-            return "over so long a way it is a spring, not friction"
+            return "over so long a distance it is a spring, not friction"
         return not_all_of_coulomb(
             scene, member.place, value, std, "over a distance", SMALLEST_COULOMB_SHARE, LARGEST_COULOMB_SHARE
         )

@@ -22,19 +22,21 @@ MAX_RECORDINGS = 36
 
 
 class DelayOfEachRecording(TimeDelay):
-    """Effort of all joints that is recorded later than position, by another time in each recording.
+    """Effort of all joints that is recorded later than position, with a different delay in each recording.
 
-    Clocks that are started anew for each recording, or a logger that waits, make such delays. One of all recordings is their
-    mean, and what is left then looks like elastic gears. They come in where the joints agree that the recordings differ,
-    see `scara_ident.estimation.shared_delays`, and are corrected as that of all is; a held-out recording tells its own by its first part.
-    Each is estimated in the lower part of the band: where a controller damps by differences of coarse positions, their noise in the
-    torque and in the column make one of milliseconds in a recording that moves little.
+    Clocks that are started again for each recording, or a logger that waits, cause such delays. A single delay for all
+    recordings is their mean, and the rest then looks like elastic gears. The effect is added if the joints agree that
+    the recordings differ, see `scara_ident.estimation.shared_delays`, and the data are corrected as for a delay of all
+    recordings; the delay of a held-out recording is estimated from its first part. Each delay is estimated in the lower
+    part of the band: if a controller damps by differences of coarse positions, their noise in the torque and in the
+    column would cause delays of milliseconds in recordings with little motion.
 
-    When friction turns is left to no column: samples of a jump are up to half an interval off, and friction that builds up over a
-    distance is late too. A delay that is there takes that along once it is corrected.
+    The times at which friction changes sign are used by no column: the samples of a jump are wrong by up to half an
+    interval, and friction that builds up over a distance is late too. The correction of a real delay shifts these times
+    as well.
     """
 
-    summary = "effort that is recorded later than position, by another time in each recording"
+    summary = "effort that is recorded later than position, with a different delay in each recording"
     of_each_recording = True
 
     def members(self, scene: Scene) -> tuple[Member, ...]:
@@ -81,8 +83,8 @@ class DelayOfEachRecording(TimeDelay):
         if float(np.max(np.abs(value))) * scene.rate > SAMPLING:
             return None
         return (
-            f"effort and position are {1e3 * float(np.min(value)):+.2g} to {1e3 * float(np.max(value)):+.2g} ms apart, by another "
-            "time in each recording, less than one sample"
+            f"effort and position are {1e3 * float(np.min(value)):+.2g} to {1e3 * float(np.max(value)):+.2g} ms apart, "
+            f"differently in each recording, by less than one sample"
         )
 
     def alike(self, value: Array, covariance: Array) -> tuple[Array, Array]:
@@ -104,7 +106,7 @@ class DelayOfEachRecording(TimeDelay):
 
     def or_else(self, scene: Scene, member: Member, value: Array) -> str:
         """Say so where they do not differ, and which of both is late where the mean is negative."""
-        said = ", here by the same in all" if _one(value) else ""
+        said = "; here the delay is the same in all" if _one(value) else ""
         return said + super().or_else(scene, member, np.mean(value, keepdims=True))
 
     def parameters(self, scene: Scene, member: Member, value: Array, covariance: Array) -> Mapping[str, Parameter]:

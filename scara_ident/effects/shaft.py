@@ -21,12 +21,13 @@ SEEN_STDS = 3.0
 
 @dataclass(frozen=True)
 class CoupledShaft(Effect):
-    """Inertia and friction of what turns with the sum or the difference of two joints' motions.
+    """Inertia and friction of a shaft that turns with the sum or the difference of two joints' motions.
 
     With ``w = v_j + s v_k``, s = 1 or -1, its torque ``J dw/dt + viscous w + coulomb sign(w)`` loads joint j, and s times it
-    loads joint k, both at the joint (Janot, Vandanjon, Gautier 2014, on the wrist of a TX40). It is named only
-    where friction is seen: inertia alone has an effect of its own. A short run tells friction on both joints well before the
-    inertia, and where the links' inertia spans that of the shaft, as about parallel axes, friction is all that is left of it.
+    loads joint k, both at the joint (Janot, Vandanjon, Gautier 2014, on the wrist of a TX40). It is reported only if
+    its friction is significant; inertia alone is a separate effect. A short run determines the friction on both joints
+    well before the inertia. If the links' inertia includes that of the shaft, as with parallel axes, only the friction
+    can be found.
     """
 
     way: Literal["sum", "difference"] = "sum"
@@ -87,7 +88,7 @@ class CoupledShaft(Effect):
             if x < -SEEN_STDS * spread:
                 return item.positive
         seen = value > SEEN_STDS * std
-        return None if np.any(seen[1 - first :]) else "no friction that turns with both joints is seen"
+        return None if np.any(seen[1 - first :]) else "no friction that depends on both joints is seen"
 
     def _first(self, scene: Scene, member: Member) -> int:
         """Return 1 where the base model spans the inertia, else 0."""

@@ -20,9 +20,9 @@ SMALLEST_SHARE, LARGEST_SHARE = 0.4, 1.5
 class SmoothCoulomb(AtLowSpeed):
     """Coulomb friction without a jump: ``u = amplitude tanh(v/velocity)`` where the base model has ``a0 sign(v)``.
 
-    The column is ``tanh(v/velocity) - sign(v)`` and its coefficient comes out near a0. It is the sigmoid that is fitted to
-    arms whose joints creep through a reversal (Gaz, Cognetti, Oliva, Robuffo Giordano, De Luca 2019, "Dynamic
-    identification of the Franka Emika Panda robot"), and what most simulators have.
+    The column is ``tanh(v/velocity) - sign(v)`` and its coefficient is close to a0. This sigmoid is fitted to arms
+    whose joints reverse slowly (Gaz, Cognetti, Oliva, Robuffo Giordano, De Luca 2019, "Dynamic
+    identification of the Franka Emika Panda robot"), and most simulators use it.
     """
 
     name = "smooth_coulomb"
@@ -30,7 +30,7 @@ class SmoothCoulomb(AtLowSpeed):
     coefficients = (
         Coefficient(
             "amplitude", "{torque}", "Coulomb friction of {joint} that builds up with speed",
-            "friction would be larger near rest",
+            "friction would be larger at low speed",
         ),
     )  # fmt: skip
     shares = SPEED_SHARES

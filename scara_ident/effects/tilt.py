@@ -151,17 +151,19 @@ class _Tilt(Effect):
     imitated_by = (ToolForce(),)
     watched = True
     view = View("position")
-    experiment = "hold still, or creep, at positions over more than half a turn: a tilt follows the angle's sine, a spring the angle"
+    experiment = "hold still, or move very slowly, at positions over more than half a turn: a tilt's torque follows the sine of the angle, a spring's the angle"
 
 
 class BaseTilt(_Tilt):
-    """Gravity's components -g tilt_x and -g tilt_y along the base's x and y axes; of one that hangs or leans, across gravity.
+    """Gravity's components -g tilt_x and -g tilt_y along the base's x and y axes.
 
-    What they do to parameters that the model estimates anyway tells the tilt. On an arm with vertical axes they also
-    bring in first moments that no motion determined before (of the first link, and of all that it carries); these have
-    columns of their own, whose coefficients are tilt times first moment. If they point where the URDF's first moments
-    say, they take part in the estimate of the tilt; a position torque of one joint, such as a spring, gives a tilt of
-    zero beside such coefficients.
+    With a hanging or leaning base the two axes are those across gravity.
+
+    The tilt is determined by its influence on parameters that the model estimates anyway. On an arm with vertical axes
+    the components also bring in first moments that no motion determined before (of the first link, and of all that it
+    carries); these have their own columns, whose coefficients are tilt times first moment. If their direction agrees
+    with the URDF's first moments, they take part in the estimate of the tilt. If only one joint has a torque over
+    position, such as that of a spring, these coefficients absorb it and the tilt is zero.
     """
 
     def members(self, scene: Scene) -> tuple[Member, ...]:
@@ -174,7 +176,7 @@ class BaseTilt(_Tilt):
         tilts = (_tilt_column(scene.robot, axis) for axis in gravity.known_axes)
         units = (_moment_unit(scene.robot, gravity.entering[:, k]) for k in range(len(gravity.entering_axes)))
         entering = (
-            Column(f"tilt_moment{k + 1}", None, unit, "tilt times a first moment that a level base does not show")
+            Column(f"tilt_moment{k + 1}", None, unit, "tilt times a first moment that has no effect with a level base")
             for k, unit in enumerate(units)
         )
         return (*tilts, *entering)
@@ -197,7 +199,7 @@ class BaseTilt(_Tilt):
         if steep is not None or not gravity.entering_axes:
             return steep
         if np.all(np.abs(value[:count]) < DOUBT_STDS * std[:count]):
-            return "only one joint shows it, as a spring would; what else gravity must do is missing"
+            return "only one joint shows it, as with a spring; gravity would act on other joints too"
         return None
 
     def parameters(self, scene: Scene, member: Member, value: Array, covariance: Array) -> Mapping[str, Parameter]:
@@ -214,10 +216,10 @@ class BaseTilt(_Tilt):
 
 
 class NominalBaseTilt(_Tilt):
-    """The same with the URDF's first moments, but for one factor, for those that a level base does not show.
+    """The same, with the URDF's first moments, up to one factor, for those that a level base does not determine.
 
-    Two columns say what `BaseTilt` says with more, so that a smaller tilt is found, and found on all joints at once;
-    a spring on one joint has no such company. It offers nothing where no new parameter enters.
+    It needs two columns where `BaseTilt` needs more, so it finds a smaller tilt, and it finds it on all joints at once;
+    a spring acts on one joint only. It is not tried if no new parameter enters.
     """
 
     nonlinear = (NonlinearParameter("moment_factor", "1", 1.0 / MOMENT_FACTOR, MOMENT_FACTOR),)
@@ -273,7 +275,7 @@ def _moment_unit(robot: Robot, moments: Array) -> str:
 
 def _too_steep(tilt: Array, std: Array) -> str | None:
     if np.any(np.abs(tilt) > LARGEST_TILT + DOUBT_STDS * std):
-        return f"a base that leans by {float(np.max(np.abs(tilt))):.2g} rad would be seen by eye"
+        return f"a base tilted by {float(np.max(np.abs(tilt))):.2g} rad would be visible"
     return None
 
 

@@ -31,7 +31,7 @@ class ToolForce(Effect):
     of_position = True
     of_state = True
     smooth = True
-    not_simulated = "it is no part of an arm: a push without end is one"
+    not_simulated = "it is not a property of the arm: use a push without end"
 
     def members(self, scene: Scene) -> tuple[Member, ...]:
         """Return that of all joints."""

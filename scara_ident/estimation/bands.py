@@ -127,13 +127,13 @@ def _choice(model: TorqueModel, bands: Array, fit: Explained, edges: Array, floo
         band, rows = bands[j], ROWS_PER_HERTZ * bands[j] * moving[j]
         if not some[j]:
             notes.append(
-                f"{joint}: its motion explains under half of its torque at every frequency; the band is left at {band:.3g} Hz"
+                f"{joint}: at every frequency its motion explains less than half of its torque; the band stays at {band:.3g} Hz"
             )
         elif fit.explains[j] < band and band <= floor[j]:
             narrow.append(j)
         if moving[j] > 0.0 and rows < need:
             notes.append(
-                f"{joint}: moves for {moving[j]:.2g} s in all, too little to tell its own parameters; record it moving"
+                f"{joint}: moves for {moving[j]:.2g} s in all, which is too short to determine its parameters; record it in motion"
             )
     if narrow:
         notes.insert(0, _needs_longer(model, narrow, fit.explains, bands))

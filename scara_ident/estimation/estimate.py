@@ -55,7 +55,7 @@ class JointError:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Estimate(Saved, reported_by="estimate"):
-    """Parameters of a model and how sure they are.
+    """Parameters of a model with their covariance.
 
     Attributes
     ----------
@@ -63,26 +63,27 @@ class Estimate(Saved, reported_by="estimate"):
     method : str
     value : ndarray, shape (p,)
     covariance : ndarray, shape (p, p)
-        Infinite variance where a parameter is undetermined.
+        Infinite variance if a parameter is undetermined.
     undetermined : ndarray of bool, shape (p,)
-        Parameters that the data leave open, alone or in a combination.
+        Parameters that the data do not determine, alone or in a combination.
     information : Information
-        All rows with the weights of the estimate, offsets of runs as the noise they were to it.
+        Information of all rows, with the weights of the estimate, and with the offsets of runs as noise if it treated
+        them so.
     weights : ndarray, shape (n,)
         Weight of each joint's rows.
     std_kind : str
-        How the covariance was found, see `scara_ident.estimation.covariance`.
+        Method of the covariance, see `scara_ident.estimation.covariance`.
     variation : RunVariation or None
-        How runs differ, which is part of the covariance; None where it was not looked for.
+        Differences between runs, which are part of the covariance; None if not estimated.
     offsets : RunVariation or None
-        How far offsets of runs lie apart that the fit took for noise, see `scara_ident.estimation.run_offsets`; None where it
-        took none.
+        Scatter of the offsets of runs that the fit treated as noise, see `scara_ident.estimation.run_offsets`; None if
+        there is none.
     noise_bias : ndarray, shape (p,), or None
-        By how much the noise of positions moves the parameters, which is part of the covariance; None where negligible
-        or not looked for.
+        Bias of the parameters by the noise of positions, which is part of the covariance; None if negligible or not
+        estimated.
     followed : ndarray, shape (p,), or None
-        By how much the parameters differ from those that would fit the same columns best, where columns follow them; None where
-        these are they.
+        If columns depend on the parameters: the difference of the parameters from those that would fit the same columns
+        best; otherwise None.
     """
 
     model: TorqueModel
@@ -99,12 +100,12 @@ class Estimate(Saved, reported_by="estimate"):
     followed: Array | None = field(default=None, kw_only=True)
 
     def rows(self, observations: Observations) -> tuple[Information, ...]:
-        """Return the rows of each joint as the estimate saw them, which its parameters fit best.
+        """Return the rows of each joint as used by the estimate, which its parameters fit best.
 
         Parameters
         ----------
         observations : Observations
-            That it was estimated from.
+            The observations of the estimate.
         """
         joints = beside_offsets(observations, self.offsets).fitted.by_joint
         return joints if self.followed is None else tuple(item.moved(self.followed) for item in joints)
@@ -116,7 +117,7 @@ class Estimate(Saved, reported_by="estimate"):
 
     @cached_property
     def prediction(self) -> Prediction:
-        """The torque as a function of position, velocity and acceleration, and what of the model it leaves out."""
+        """The torque as a function of position, velocity and acceleration, and the parts of the model that it leaves out."""
         return Prediction(self.model, self.value)
 
     def predict(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> Array:
@@ -128,7 +129,7 @@ class Estimate(Saved, reported_by="estimate"):
         return f"{model.robot.name}, {model.name} by {self.method}: {len(self.value)} parameters"
 
     def errors(self, observations: Observations) -> tuple[JointError | None, ...]:
-        """Return the error on recordings, joint by joint; None where no sample of a joint was used."""
+        """Return the error on recordings for each joint; None if no sample of a joint was used."""
         return joint_errors(self.value, observations, own_offsets=self.offsets is not None)
 
 

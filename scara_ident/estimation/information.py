@@ -50,7 +50,7 @@ class Information(Frozen):
     factor : ndarray, shape (k, p + 1)
         Upper triangular with at most p + 1 rows; ``factor.T @ factor`` equals ``[W | u].T @ [W | u]``.
     rows : float
-        Number of rows (of equal weight 1) that it stands for.
+        Number of rows (of equal weight 1) that it contains.
     """
 
     factor: Array
@@ -58,17 +58,17 @@ class Information(Frozen):
 
     @staticmethod
     def empty(parameters: int) -> Information:
-        """Return the information of no rows: nothing is known of any parameter."""
+        """Return the information of no rows: no parameter is determined."""
         return Information(np.zeros((0, parameters + 1)), 0.0)
 
     @staticmethod
     def prior(mean: Array, std: Array) -> Information:
-        """Return the rows that say each parameter is ``mean`` within ``std``.
+        """Return the rows of a prior: each parameter is ``mean`` with standard deviation ``std``.
 
         Parameters
         ----------
         mean, std : ndarray, shape (p,)
-            Infinite std: nothing is known of that parameter.
+            Infinite std: no prior for that parameter.
 
         Raises
         ------
@@ -87,12 +87,12 @@ class Information(Frozen):
 
     @property
     def regressor_factor(self) -> Array:
-        """R of the regressor alone, shape (p, p), with fewer rows where there were fewer."""
+        """R of the regressor alone, shape (p, p), with fewer rows if there were fewer."""
         return self.factor[: self.parameters, :-1]
 
     @property
     def projected_torque(self) -> Array:
-        """Torque seen through the regressor's range: the right-hand side of `regressor_factor`."""
+        """Torque projected on the regressor's range: the right-hand side of `regressor_factor`."""
         return self.factor[: self.parameters, -1]
 
     def absorb(self, regressor: Array, torque: Array, *, decay: float = 1.0) -> Information:
@@ -103,7 +103,7 @@ class Information(Frozen):
         regressor : ndarray, shape (N, p)
         torque : ndarray, shape (N,)
         decay : float, optional
-            Factor on what was known before, as in forgetting; 1 keeps it.
+            Factor on the earlier information, as in forgetting; 1 keeps it.
 
         Raises
         ------
@@ -138,7 +138,7 @@ class Information(Frozen):
         return Information(whole, decay * self.rows + count)
 
     def moved(self, change: Array) -> Information:
-        """Return this information of rows whose torque parameters (p,) that differ by so much explain as well."""
+        """Return the information of the same rows with a torque changed by that of parameters (p,)."""
         factor = self.factor.copy()
         factor[:, -1] += factor[:, :-1] @ change
         return Information(factor, self.rows)
@@ -160,7 +160,7 @@ class Information(Frozen):
         return Information(wide if np.all(np.diff(columns) > 0) else triangular(wide), self.rows)
 
     def solve(self) -> Solution:
-        """Return the least-squares estimate and what it leaves undetermined."""
+        """Return the least-squares estimate and the undetermined parameters."""
         r = self.regressor_factor
         size = np.linalg.norm(r, axis=0)
         entering = size > 0.0
@@ -187,12 +187,12 @@ class Information(Frozen):
         return Solution(value, undetermined, null)
 
     def inverse(self) -> Array:
-        """Return the inverse of ``W.T @ W`` on what is determined, shape (p, p)."""
+        """Return the inverse of ``W.T @ W`` on the determined subspace, shape (p, p)."""
         half = orthonormal(self.regressor_factor)
         return half @ half.T
 
     def std(self) -> Array:
-        """Return the std of every parameter for rows of unit noise, shape (p,); infinite where it stays unknown."""
+        """Return the std of every parameter for rows of unit noise, shape (p,); infinite if undetermined."""
         variance = np.diag(self.inverse()).copy()
         variance[self.solve().undetermined] = np.inf
         return np.sqrt(variance)
@@ -213,16 +213,17 @@ class Information(Frozen):
         return float(np.linalg.norm(self.factor[:, -1]) / np.sqrt(self.rows)) if self.rows else 0.0
 
     def noise(self, value: Array) -> float:
-        """Return the rms residual of parameters as what it tells of the noise; 1 without rows or torque.
+        """Return the rms residual of parameters as an estimate of the noise; 1 without rows or torque.
 
-        Rows that are `saturated` are fitted exactly whatever their noise is: it may then be as large as the torque. An exact fit of more rows would give an infinite weight; rounding is the floor.
+        Rows that are `saturated` are fitted exactly, so their noise may be as large as the torque. An exact fit of more
+        rows would give an infinite weight, so rounding is the smallest value.
         """
         least = 1.0 if self.saturated else MIN_NOISE_SHARE
         return max(self.rms(value), least * self.torque_rms) or 1.0
 
     @property
     def saturated(self) -> bool:
-        """Whether there are no more rows than directions that they tell, so that they are fitted exactly."""
+        """Whether there are no more rows than directions that they determine, so that they are fitted exactly."""
         rows = self.factor[:, :-1]
         size = np.linalg.norm(rows, axis=0)
         if not 0 < len(rows) <= np.count_nonzero(size):
@@ -231,7 +232,7 @@ class Information(Frozen):
         return bool(singular[len(rows) - 1] > UNDETERMINED * singular[0])
 
     def log_det(self) -> float:
-        """Return ln det(W.T W), -inf where W does not have full rank (J_d of Indri et al. 2002)."""
+        """Return ln det(W.T W), -inf if W does not have full rank (J_d of Indri et al. 2002)."""
         size = np.linalg.norm(self.regressor_factor, axis=0)
         if not self._full_rank(size):
             return -np.inf
@@ -239,7 +240,7 @@ class Information(Frozen):
         return float(2.0 * (np.sum(np.log(singular)) + np.sum(np.log(size))))
 
     def condition(self) -> float:
-        """Return cond(W.T W), inf where W does not have full rank (J_k of Indri et al. 2002)."""
+        """Return cond(W.T W), inf if W does not have full rank (J_k of Indri et al. 2002)."""
         if not self._full_rank(np.linalg.norm(self.regressor_factor, axis=0)):
             return np.inf
         singular = np.linalg.svd(self.regressor_factor, compute_uv=False)
@@ -273,7 +274,7 @@ class Solution:
 
 
 def merge(parts: Iterable[Information]) -> Information:
-    """Merge the information of different rows; the order does not matter.
+    """Merge the information of different sets of rows; the order does not matter.
 
     Parameters
     ----------
@@ -283,7 +284,7 @@ def merge(parts: Iterable[Information]) -> Information:
     Raises
     ------
     UsageError
-        If there is none, or they are of different numbers of parameters.
+        If there is none, or they have different numbers of parameters.
     """
     items = list(parts)
     if not items:

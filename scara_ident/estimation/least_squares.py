@@ -50,16 +50,16 @@ def ols(observations: Observations) -> Estimate:
 def wls(observations: Observations, noise: Array | None = None, least: RunVariation | None = None) -> Estimate:
     """Estimate by least squares with each joint's rows divided by its noise.
 
-    Offsets that differ from run to run are noise too, see `scara_ident.estimation.run_offsets`.
+    Offsets that differ from run to run count as noise too, see `scara_ident.estimation.run_offsets`.
 
     Parameters
     ----------
     observations : Observations
     noise : ndarray, shape (n,), optional
-        Standard deviation of each joint's torque, from repetitions; by default each joint's residual within the band,
-        in rounds: at first a bad joint spoils the good one's.
+        Standard deviation of each joint's torque, from repetitions. Default: each joint's residual within the band,
+        computed iteratively, because at first a bad joint increases the residual of the others.
     least : RunVariation, optional
-        Offsets that runs are taken to differ by at least.
+        Smallest differences of the offsets between runs to assume.
 
     Returns
     -------
@@ -68,7 +68,7 @@ def wls(observations: Observations, noise: Array | None = None, least: RunVariat
     Raises
     ------
     UsageError
-        If there is not one number of noise for each joint.
+        If there is not one noise value for each joint.
     EstimationError
         If there is nothing to estimate from, or a joint's noise is not a positive number.
     """
@@ -155,7 +155,7 @@ def least_squares(
     method : str
         As the estimate is called; of `wls` offsets of runs are noise.
     least : RunVariation, optional
-        Offsets that runs are taken to differ by at least.
+        Smallest differences of the offsets between runs to assume.
     """
     fit, rows = _fit(observations, weigh, method, prior), beside_offsets(observations, None)
     variation, spread = side_by_side(

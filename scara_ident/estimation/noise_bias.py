@@ -164,4 +164,4 @@ def bias_sentence(names: Sequence[str], bias: Array, std: Array) -> str | None:
     if not moved:
         return None
     said = listed([f"{names[k]} by about {bias[k]:.2g}" for k in moved], 6)
-    return f"the noise of the positions biases {said}; their standard deviations hold that"
+    return f"the noise of the positions biases {said}; their standard deviations include that bias"

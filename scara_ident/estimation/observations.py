@@ -31,7 +31,7 @@ from scara_ident.threads import THREADS, side_by_side
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Observations(Frozen):
-    """What recordings say of a model.
+    """The rows of a model on recordings.
 
     Attributes
     ----------
@@ -41,11 +41,11 @@ class Observations(Frozen):
     owner : ndarray of int, shape (blocks,)
         Recording of each block.
     raw : SampleColumns
-        For every recording, stretch and joint the columns at every sample, not filtered.
+        For every recording, stretch and joint the unfiltered columns at every sample.
     kept : Observations or None
-        Those whose rows are of the samples in `data` alone, where the rows hold all of longer files; None where they hold no more.
+        If the rows are of all samples of longer files: the observations of the samples in `data` alone; otherwise None.
     counts : tuple of int, or None
-        Of each recording the samples that the rows are of; None where those are the ones in `data`.
+        Number of samples of each recording in the rows; None if they are those in `data`.
     """
 
     model: TorqueModel
@@ -104,9 +104,9 @@ class Observations(Frozen):
         return tuple(side_by_side(lambda joint: joint.information(self.parameters), self.joints))
 
     def unfiltered_rms(self, value: Array) -> Array:
-        """Return the rms of what parameters leave of the recorded torque, nothing filtered, shape (n,).
+        """Return the rms of the unfiltered residual torque of parameters, shape (n,).
 
-        Over all samples of a joint that are neither at rest nor at the ends; NaN where there is none.
+        Over all samples of a joint that are neither at rest nor at the ends; NaN if there are none.
         """
         predicted = zip(self.data.stretches, self.predicted(value), strict=True)
         torque = [own for part, own in predicted if part.usable]
@@ -141,7 +141,7 @@ class Observations(Frozen):
 
     @property
     def samples(self) -> int:
-        """Samples on the uniform time grids, those of long files counted in."""
+        """Samples on the uniform time grids, including those of long files."""
         return sum(part.samples for part in self.data.stretches) if self.counts is None else sum(self.counts)
 
     @property
@@ -151,7 +151,7 @@ class Observations(Frozen):
 
     @cached_property
     def left_out_rest(self) -> tuple[float, ...]:
-        """For each joint the share of the remaining samples left out because it stood still."""
+        """For each joint the share of the remaining samples that is left out because the joint stood still."""
         used, rested = np.zeros(len(self.joints)), np.zeros(len(self.joints))
         for part in self._usable:
             used += np.count_nonzero(part.used, axis=1)
@@ -160,7 +160,7 @@ class Observations(Frozen):
         return tuple(float(share) for share in rested / np.maximum(used + rested, 1.0))
 
     def faded(self, shares: Array) -> Observations:
-        """Return the observations with each block counting for a share of its samples, shares of shape (blocks,)."""
+        """Return the observations with each block weighted by a share of its samples, shares of shape (blocks,)."""
         return replace(self, joints=tuple(joint.faded(shares) for joint in self.joints))
 
     def with_torque(self, data: PreparedData) -> Observations:
@@ -174,7 +174,7 @@ class Observations(Frozen):
     def predicted(self, value: Array) -> tuple[Array, ...]:
         """Return the torque that parameters predict on every stretch, shape (n, N) each, not filtered.
 
-        That of the last parameters is kept, for more than one ask for it, and cannot be written to.
+        The result for the last parameters is cached and read-only.
         """
         columns = [joint.columns for joint in self.joints]
 
@@ -193,7 +193,7 @@ class Observations(Frozen):
         )
 
     def late(self, value: Array) -> tuple[Array, ...]:
-        """Return for each joint by what the predicted torque on its rows changes with each second it is late, shape (N,).
+        """Return for each joint the derivative of the predicted torque on its rows by a delay, shape (N,).
 
         That of the last parameters is kept.
         """
@@ -244,7 +244,7 @@ class Observations(Frozen):
         return known[1]
 
     def residuals(self, value: Array) -> Residuals:
-        """Return what parameters leave of the recorded torque at every sample."""
+        """Return the residual torque of parameters at every sample."""
         return Residuals(self.data, self.predicted(value))
 
     @property
@@ -254,7 +254,7 @@ class Observations(Frozen):
 
 
 def observe(model: TorqueModel, data: PreparedData, known: Observations | None = None) -> Observations:
-    """Make a model's rows on prepared data.
+    """Compute a model's rows on prepared data.
 
     Parameters
     ----------
@@ -262,7 +262,8 @@ def observe(model: TorqueModel, data: PreparedData, known: Observations | None =
     data : PreparedData
         With effort.
     known : Observations, optional
-        Of the same model; recordings that it holds in the same bands, with the same left out, are not observed again.
+        Observations of the same model; recordings that it contains with the same bands and the same parts left out are
+        reused.
 
     Returns
     -------
@@ -370,8 +371,8 @@ def _recording_rows(
     if not any(len(kept) for part, _ in parts for kept in part.kept):
         samples = sum(part.samples for part in item.stretches)
         raise RecordingError(
-            f"{item.recording.path or item.name}: nothing is left of {samples} samples once the ends and the times "
-            f"at rest are left out; {coarse_positions(item, unit) or 'record longer or moving data'}"
+            f"{item.recording.path or item.name}: none of {samples} samples can be used, because the ends and the "
+            f"times at rest are left out; {coarse_positions(item, unit) or 'record longer or moving data'}"
         )
     found = []
     for j in range(len(item.bands)):

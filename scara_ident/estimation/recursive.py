@@ -46,8 +46,8 @@ def rls(
 ) -> tuple[Estimate, History]:
     """Estimate recursively.
 
-    The recursion of Indri et al. (2002, section 3) in square-root form: the state is the triangular factor, so
-    that R_P = infinity is the empty factor, exactly, and nothing is lost to rounding. Without prior and
+    The recursion of Indri et al. (2002, section 3) in square-root form: the state is the triangular factor, so R_P =
+    infinity is exactly the empty factor, and rounding errors stay small. Without prior and
     forgetting the last estimate is that of `ols`.
 
     Parameters
@@ -55,10 +55,10 @@ def rls(
     observations : Observations
         In the order of time.
     prior : Information, optional
-        Rows of a prior, see `Information.prior`; by default nothing is known (R_P = infinity).
+        Rows of a prior, see `Information.prior`; default: no prior (R_P = infinity).
     forgetting : float, optional
-        Factor per sample on the information of the past, in (0, 1]; 1 forgets nothing. It acts between blocks
-        of time; within a block (about half a second) all samples count the same.
+        Factor per sample on the past information, in (0, 1]; 1 forgets nothing. It acts between blocks of time; within
+        a block (about half a second) all samples have the same weight.
 
     Returns
     -------

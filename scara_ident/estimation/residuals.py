@@ -28,7 +28,7 @@ class Residuals(Frozen):
 
     @cached_property
     def banded(self) -> tuple[Array, ...]:
-        """Residual on every stretch, shape (n, N), faded out towards rest and within the bands."""
+        """Residual on every stretch, shape (n, N), within the bands and faded out towards rest."""
         return tuple(
             np.array([part.smooth(j, row) for j, row in enumerate(part.torque - predicted)])
             for part, predicted in zip(self.data.stretches, self.predicted, strict=True)

@@ -169,7 +169,7 @@ def disagreement(estimate: Estimate, robust: RobustFit) -> str | None:
     if not worst:
         return None
     said = listed([f"{estimate.model.names[k]} by {shift[k]:+.1f} std" for k in worst], LISTED)
-    return f"a fit that bounds what each half second can do differs from least squares in {said}"
+    return f"a robust fit, which limits the influence of each half second, differs from least squares in {said}"
 
 
 def _huber(size: Array) -> Array:

@@ -168,16 +168,16 @@ class RunVariation:
             rms = np.sqrt(np.mean(item.directions**2, axis=1))
             late, least = late_alike(item), SPOKEN_OF * rms[SCALE]
             if shared is None and abs(late) * rms[DELAY] > least:
-                found.append(f"{joint} {late_words(item, late)} in all runs alike")
+                found.append(f"{joint} {late_words(item, late)} in all runs")
             few = 0.0 if late else late_by_few(item)
             if shared is None and abs(few) * rms[DELAY] > least:
                 found.append(
-                    f"{joint} {late_words(item, few)} in {len(item.of_run)} runs, which are too few to tell a delay"
+                    f"{joint} {late_words(item, few)} in {len(item.of_run)} runs, which are too few to determine a delay"
                 )
             units = ("{:.2g} %", "{:.2g} %", "{:.2g} " + robot.torque_unit(j), "{:.2g} ms")
             scales = (100, 100, 1, 1000)
             shown = [
-                "what follows the slope of its torque by more than any delay would"
+                "a part in proportion to its torque's derivative that is too large for a delay"
                 if what == _DIFFERING[DELAY] and std > item.reach
                 else f"{what} by {'more than all of it' if scale == 100 and std > 1.0 else unit.format(std * scale)}"
                 for what, std, size, unit, scale in zip(_DIFFERING, item.apart, rms, units, scales, strict=True)
@@ -185,10 +185,10 @@ class RunVariation:
             ]
             if shown:
                 said = f"{joint} differs from run to run (standard deviation): {', '.join(shown)}"
-                found.append(said + ("; what is unexplained may make it seem so" if joint == unexplained else ""))
+                found.append(said + ("; the unexplained part may cause this" if joint == unexplained else ""))
         if shared is not None and shared.share > SPOKEN_OF:
             size = f"standard deviation {1e3 * shared.std:.2g} ms"
-            found.append(f"effort comes late by another time in each run, on all joints alike ({size})")
+            found.append(f"effort is late on all joints alike, by a different time in each run ({size})")
         return found
 
     def __bool__(self) -> bool:
@@ -348,7 +348,7 @@ def late_by_few(item: JointVariation) -> float:
 def late_words(item: JointVariation, late: float) -> str:
     """Return what the torque of a joint does that is late by so many seconds, in every run."""
     if abs(late) > item.reach:
-        return "is left with what follows the slope of its torque by more than any delay would"
+        return "leaves a part in proportion to its torque's derivative that is too large for a delay"
     return f"{'lags' if late > 0.0 else 'leads'} by {1e3 * abs(late):.2g} ms"
 
 

@@ -70,13 +70,13 @@ def read_estimate(path: Path, robot: Robot) -> Estimate | None:
     model = build_model(robot, name)
     if joints != robot.joints or names != model.names:
         raise UsageError(
-            f"{path}: is of {held.get('robot')} with the joints {', '.join(joints)}, whose {name} model has other "
+            f"{path}: is of {held.get('robot')} with the joints {', '.join(joints)}, and its {name} model has other "
             f"parameters than that of {robot.name}; give the robot that it was identified with"
         )
     try:
         return _estimate(held, model)
     except (ValueError, KeyError, TypeError) as error:
-        raise UsageError(f"{path}: its estimate is not whole ({error}); save it again") from None
+        raise UsageError(f"{path}: its estimate is incomplete ({error}); save it again") from None
 
 
 def _estimate(held: dict[str, Any], model: TorqueModel) -> Estimate:

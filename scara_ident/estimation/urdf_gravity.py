@@ -130,8 +130,8 @@ def gravity_sentence(gravity: UrdfGravity | None) -> str | None:
         return None
     if gravity.missing:
         return (
-            "Gravity does not show in these efforts while the inertia of the URDF does: the controller may subtract it, or "
-            "springs bear it; log the whole effort, or state gravity: [0, 0, 0] in robot.yaml."
+            "These efforts contain the inertia of the URDF but no gravity: the controller may subtract gravity, or "
+            "springs may carry the weight; log the whole effort, or state gravity: [0, 0, 0] in robot.yaml."
         )
     if gravity.elsewhere:
         return elsewhere_sentence(near_axis(gravity.found / np.linalg.norm(gravity.found)), gravity.stated)
@@ -142,9 +142,10 @@ def elsewhere_sentence(along: Array, stated: Array) -> str:
     """Say that gravity points along a direction of length 1, and what to state."""
     state = float(np.linalg.norm(stated)) * along
     return (
-        f"Gravity seems to point along {_listed(along)} of the base, {angle(along, stated):.0f} degrees from what "
-        f"the description says: if the arm is mounted so, state gravity: {_listed(state)} in robot.yaml; else a joint's "
-        "position may count from another zero than the URDF, as by half a turn of the shoulder (recording, position: offset)."
+        f"Gravity seems to point along {_listed(along)} of the base, {angle(along, stated):.0f} degrees from the "
+        f"direction in the robot description: if the arm is mounted so, state gravity: {_listed(state)} in robot.yaml; "
+        f"otherwise the zero of a joint's position may differ from the URDF's, such as by half a turn of the shoulder "
+        f"(recording, position: offset)."
     )
 
 

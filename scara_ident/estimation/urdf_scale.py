@@ -188,7 +188,7 @@ def scale_sentence(
     said = _compared(scales, robot, slight, friction)
     if not scales or not unlike:
         return said
-    return f"{said} On {', '.join(unlike)} they are not the URDF's in any scale."
+    return f"{said} On {', '.join(unlike)} no scale makes them those of the URDF."
 
 
 def gravity_acts(robot: Robot) -> bool:
@@ -202,16 +202,16 @@ def gravity_acts(robot: Robot) -> bool:
 
 def _compared(scales: Mapping[str, float] | None, robot: Robot, slight: Sequence[str], friction: FrictionSides) -> str:
     geared = np.any(robot.reduction != 1.0)
-    said = "No recording tells a scale common to all torques and masses"
+    said = "Recordings cannot determine a common scale of all torques and masses"
     if gravity_acts(robot):
-        said += f": it rests on {'effort_gain and effort_side' if geared else 'effort_gain'}"
+        said += f": it depends on {'effort_gain and effort_side' if geared else 'effort_gain'}"
     else:
         rest = "effort_gain, effort_side and the clock" if geared else "effort_gain and the clock"
-        said += f", nor, without gravity, that of time: they rest on {rest}"
+        said += f", nor, without gravity, the scale of time: these depend on {rest}"
     if scales is None:
         return f"{said}."
     if not scales:
-        return f"{said}; whether the torques are those of the URDF's bodies, these recordings do not tell."
+        return f"{said}; these recordings do not show whether the torques are those of the URDF's bodies."
     # A scale that all joints share is one, whatever each of them bears.
     shared = _alike(scales.values()) and any(joint not in slight for joint in scales)
     little = {joint: scales[joint] for joint in slight if joint in scales and not 1.0 / USUAL < scales[joint] < USUAL}
@@ -219,7 +219,7 @@ def _compared(scales: Mapping[str, float] | None, robot: Robot, slight: Sequence
         others = {joint: scale for joint, scale in scales.items() if joint not in little}
         few = ", ".join(f"{scale:.2g} times the URDF's on {joint}" for joint, scale in little.items())
         begun = f"{_compared(others, robot, (), friction)} They" if others else f"{said}. Torques of the bodies"
-        return f"{begun} are {few}, but so small there that a centre of mass a little off makes as much."
+        return f"{begun} are {few}, but they are so small there that a small error of a centre of mass explains this."
     size = np.array(list(scales.values()))
     turned = [joint for joint, scale in scales.items() if scale < 0.0]
     if turned:
@@ -240,7 +240,7 @@ def _compared(scales: Mapping[str, float] | None, robot: Robot, slight: Sequence
         if not fits
     )
     # A URDF is often right of the large links and has the small ones roughly.
-    or_masses = " there, or are the masses others" if np.any(usual) else ""
+    or_masses = " there, or do the masses differ" if np.any(usual) else ""
     return f"{said}. Torques of the bodies are {odd}: {asked}{or_masses}?"
 
 
@@ -252,19 +252,20 @@ def _turned(turned: Sequence[str], friction: FrictionSides) -> str:
     said = []
     if pushed:
         said.append(
-            f"{', '.join(pushed)}, and friction feeds energy in there: efforts or positions count backwards, negate effort_gain "
-            "or the position's scale."
+            f"{', '.join(pushed)}, and friction feeds energy in there: efforts or positions have the wrong sign; "
+            f"negate effort_gain or the position's scale."
         )
     if braked:
         said.append(
-            f"{', '.join(braked)}, though friction brakes there, so that efforts have the sign of the positions: the centre of "
-            "mass lies elsewhere than in the URDF, or both count against the URDF's axis, or gravity has another direction."
+            f"{', '.join(braked)}, but friction brakes there, so efforts and positions have consistent signs: the "
+            f"centre of mass is not where the URDF has it, or both signs are opposite to the URDF's axis, or gravity "
+            f"has another direction."
         )
     if others:
         said.append(
             f"{', '.join(others)}: negate effort_gain there, or the axis, unless gravity has another direction."
         )
-    return " They have it on ".join(said)
+    return " They also have the opposite sign on ".join(said)
 
 
 def _alike(scales: Iterable[float]) -> bool:

@@ -154,8 +154,9 @@ def _loaded_sentence(loaded: Mapping[str, WeightScale], robot: Robot) -> str:
     turning = any(not robot.prismatic[robot.joints.index(joint)] for joint in loaded)
     each = ", ".join(f"{own.weight:.2g} and {own.inertia:.2g} times the URDF's on {j}" for j, own in loaded.items())
     return (
-        f"Weight and inertia of the bodies are {each}, which no effort_gain makes: the URDF lacks a counterweight, a "
-        "balancing spring or cylinder, or a payload" + (", or has a centre of mass elsewhere." if turning else ".")
+        f"Weight and inertia of the bodies are {each}, which no effort_gain explains: the URDF lacks a counterweight, "
+        f"a balancing spring or cylinder, or a payload"
+        + (", or a centre of mass in the URDF is wrong." if turning else ".")
     )
 
 

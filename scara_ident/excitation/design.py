@@ -33,7 +33,7 @@ from scara_ident.threads import one_blas_thread
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Design(Saved, reported_by="design"):
-    """Trajectories with what they promise.
+    """Designed trajectories, with their limits and their expected information.
 
     Attributes
     ----------
@@ -42,26 +42,26 @@ class Design(Saved, reported_by="design"):
     trajectories : tuple of ExcitationTrajectory
     limits : Limits
     nominal : ndarray, shape (p,)
-        Parameters with which torques were foreseen.
+        Parameters with which torques were predicted.
     reached : tuple of Reached
         Every limit and how much of it is used, over all trajectories.
     verified : int
-        Samples per trajectory at which that was found.
+        Samples per trajectory at which the limits were verified.
     information : Information
-        Of all trajectories, their samples and weights, with torque zero; without what was known before.
+        Information of all trajectories, with their samples and weights, and torque zero; without the prior.
     prior : Information or None
-        What was known before.
+        Information of existing recordings.
     samples : tuple of int
         Samples of each trajectory in the information.
     weights : ndarray, shape (n,)
         Weight of every joint's rows in it.
     costs : tuple of float
-        Of every local search, as they were started.
+        Cost of every local search, in the order of their starts.
     effort : Effort
     seconds : float
-        What the search took.
+        Time of the search.
     tells : tuple of ExpectedAnswer
-        Where it was designed to answer questions, what it tells of each.
+        If it was designed to answer questions: the expected answer to each.
     """
 
     model: TorqueModel
@@ -87,12 +87,12 @@ class Design(Saved, reported_by="design"):
 
     @property
     def total(self) -> Information:
-        """Information of the trajectories and of what was known before."""
+        """Information of the trajectories and of the prior."""
         return self.information if self.prior is None else merge([self.prior, self.information])
 
     @cached_property
     def unweighted(self) -> Information:
-        """Information of all trajectories with every row counted alike, as the paper's criteria have it."""
+        """Information of all trajectories with equal weight of all rows, as in the paper's criteria."""
         if np.all(self.weights == 1.0):
             return self.information
         each = zip(self.trajectories, self.samples, strict=True)
@@ -105,20 +105,20 @@ class Design(Saved, reported_by="design"):
 
     @property
     def condition(self) -> float:
-        """J_k: cond(H^T H) of the trajectories alone, columns as they are, of `unweighted`."""
+        """J_k: cond(H^T H) of the trajectories alone, with unscaled columns, of `unweighted`."""
         return self.unweighted.condition()
 
     def motion(self, number: int = 0, rate: float = 1000.0) -> Motion:
-        """Return samples of a trajectory with the torque that is foreseen for it."""
+        """Return samples of a trajectory with its predicted torque."""
         trajectory = self.trajectories[number]
         motion = trajectory.motion(round(trajectory.duration * rate) + 1)
         torque = np.einsum("jpN,p->jN", self.model.regressor(motion), self.nominal)
         return replace(motion, torque=np.asarray(torque))
 
     def std(self) -> Array:
-        """Return the std that every parameter will have, shape (p,); infinite where it stays unknown.
+        """Return the expected std of every parameter, shape (p,); infinite if it stays undetermined.
 
-        For the given noise of the torques, or per unit of it on every row, white and at the design's samples.
+        For the given noise of the torques, or for unit noise on every row; the noise is white, at the design's samples.
         """
         return self.total.std()
 
@@ -148,34 +148,35 @@ def design_excitation(
     Parameters
     ----------
     model : TorqueModel
-        Its columns must depend on present position, velocity and acceleration alone.
+        Its columns must depend only on position, velocity and acceleration at the same time.
     duration : float or sequence of float
-        Of each trajectory, s; several give the length of each of several.
+        Duration of each trajectory, s; a sequence gives the duration of each of several trajectories.
     harmonics : int or sequence of int, optional
-        How many, or which: a multisine. See `default_harmonics`. Where lengths differ, how many the longest has; the
-        shorter have as many as reach the same frequency.
+        Number of harmonics, or their orders (a multisine). See `default_harmonics`. If durations differ, the number for
+        the longest; shorter ones have as many as reach the same frequency.
     criterion : Criterion, optional
-        By default the log determinant.
+        Default: the log determinant.
     tell : Inquiry or Diagnosis, optional
-        Instead of a criterion, the questions that one motion of harmonics is to answer best, about this model; see
+        Instead of a criterion: the questions about this model that one motion of harmonics should answer best; see
         `scara_ident.inquiry.answerability`.
     limits : Limits, optional
-        By default those of `limits_of`.
+        Default: those of `limits_of`.
     known : mapping from parameter to value, optional
-        What torques are foreseen with besides the URDF; see `nominal_parameters`.
+        Parameters that predict the torques, in addition to the URDF; see `nominal_parameters`.
     trajectories : int
-        How many are designed together, so that each fills what the others lack.
+        Number of trajectories that are designed together and complement each other.
     prior : Information, optional
-        Of existing recordings, with the columns of the model; rows weighted as those of the design are.
+        Information of existing recordings, with the columns of the model, and rows weighted as in the design.
     torque_std : ndarray, shape (n,), optional
-        Noise of every joint's torque; without it every row has weight one.
+        Noise of every joint's torque; by default every row has weight one.
     start : ndarray, shape (n,), optional
         Posture to start in (and, for harmonics, to end in), rad or m.
     family : {"fourier", "spline"}
     samples : int
-        Samples of each trajectory in the criterion; where lengths differ, of the longest, the others at the same rate.
+        Samples of each trajectory in the criterion; if durations differ, of the longest, and the others have the same
+        rate.
     name : str
-        Of the trajectories; of several ``name-a``, ``name-b``, ... .
+        Name of the trajectory; several are called ``name-a``, ``name-b``, ... .
     effort : Effort, optional
     progress : callable, optional
         Called after every local search.
@@ -187,13 +188,13 @@ def design_excitation(
     Raises
     ------
     InfeasibleLimits
-        If the limits, or the start, leave no motion.
+        If no motion keeps the limits, or none begins at the start.
     RobotError
         If a joint has no limits.
     UsageError
         If the arguments do not fit the model.
     ArgumentError
-        If there is no model.
+        If the model is no `TorqueModel`.
     ScaraIdentError
         If ``tell`` has no question.
 
@@ -222,8 +223,8 @@ def design_excitation(
         raise UsageError(f"samples {samples}: expected at least 2")
     if prior is not None and prior.parameters != count:
         raise UsageError(
-            f"existing information is about {prior.parameters} parameters, the model {model.name} has {count}; "
-            "gather it with the same model"
+            f"existing information is about {prior.parameters} parameters, the model {model.name} has {count}; compute "
+            f"it with the same model"
         )
     effort = Effort() if effort is None else effort
     limits = limits_of(robot) if limits is None else limits
@@ -291,14 +292,14 @@ def _check_asked(
     inquiry: Inquiry, model: TorqueModel, criterion: Criterion | None, trajectories: int, family: Family
 ) -> None:
     if not inquiry.questions:
-        raise ScaraIdentError(
-            "the diagnosis left no question that a motion could answer; nothing is to be recorded for it"
-        )
+        raise ScaraIdentError("the diagnosis left no question that a motion could answer; no recording is needed")
     if criterion is not None or trajectories > 1 or family != "fourier":
-        raise UsageError("a motion that tells is one trajectory of harmonics, without a criterion of its own")
+        raise UsageError("a motion for --tell is one trajectory of harmonics, and takes no criterion")
     asked = inquiry.scene.model
     if asked.names != model.names:
-        raise UsageError(f"the diagnosis is about the model {asked.name}, the design about {model.name}; use that")
+        raise UsageError(
+            f"the diagnosis is for the model {asked.name}, the design for {model.name}; use the model of the diagnosis"
+        )
 
 
 def information_of(

@@ -177,7 +177,7 @@ def limits_of(
         tool_acceleration, tool_speed, floor,
     )  # fmt: skip
     if boxes and clearance is None:
-        raise UsageError("boxes without a clearance: nothing would be kept from them; give a clearance of 0 m or more")
+        raise UsageError("boxes without a clearance have no effect; give a clearance of 0 m or more")
     if clearance is not None:
         kept = clearance_of(robot, lower, upper, margin=clearance, floor=floor, boxes=boxes)
         # A box that no link is ever clear of keeps nothing, as one whose numbers are in mm.

@@ -53,12 +53,12 @@ def write_trajectory(trajectory: ExcitationTrajectory, path: Path | str, rate: f
     path : path
         A ``.csv`` or ``.parquet`` file.
     rate : float
-        Samples per second; where they do not fill the duration, the nearest rate that does.
+        Samples per second; if the duration is no multiple of the sample time, the nearest rate for which it is.
 
     Raises
     ------
     UsageError
-        If the rate is too low to tell the motion.
+        If the rate is too low for the motion.
     RecordingError
         If the file cannot be written.
     """
@@ -237,7 +237,7 @@ def summary(design: Design) -> list[str]:
         if broken
         else f"All limits hold, at {design.verified} samples and between them.",
         *(f"{capital(item.question.text)}: {item.words}" for item in design.tells),
-        f"Held back by {_few(held, 'limit')}." if held else "No limit holds it back: use more harmonics.",
+        f"Limits that are reached: {_few(held, 'limit')}." if held else "No limit is reached: use more harmonics.",
         f"Information of the regressor H over {samples} samples{each}: J_d = ln det H^T H {design.log_det:.2f}, "
         f"J_k = cond H^T H {design.condition:.4g}.",
     ]
@@ -257,12 +257,14 @@ def _listed(numbers: Sequence[float]) -> str:
 def notes(design: Design) -> list[str]:
     """Say what the design rests on."""
     clearance = design.limits.clearance
-    said = list(clearance.notes) if clearance is not None else ["Collisions were not looked for: rehearse it slowly."]
+    said = list(clearance.notes) if clearance is not None else ["Collisions were not checked: run it slowly first."]
     if np.any(np.isfinite(design.limits.torque)):
         said.append(_foreseen(design))
     bandwidth = max(each.basis.bandwidth for each in design.trajectories)
     if bandwidth > SWINGING:
-        said.append(f"The motion reaches {bandwidth:g} Hz, where many arms swing: use fewer harmonics if yours does.")
+        said.append(
+            f"The motion reaches {bandwidth:g} Hz, where many arms oscillate: use fewer harmonics if yours does."
+        )
     if not design.trajectories[0].basis.periodic:
         said.append("The motion does not end where it starts.")
     return said
@@ -270,15 +272,15 @@ def notes(design: Design) -> list[str]:
 
 def _foreseen(design: Design) -> str:
     model = design.model
-    foreseen = "Torques were foreseen with the URDF's bodies and rotors"
+    foreseen = "Torques were predicted with the URDF's bodies and rotors"
     if not np.any(np.delete(design.nominal, np.r_[model.place(model.rigid_body)])):
         if lacking := _rotors_left_out(design):
-            foreseen = f"Torques were foreseen with the URDF's bodies, without {lacking}"
-        return f"{foreseen}, without friction: identify once, and give what was found."
+            foreseen = f"Torques were predicted with the URDF's bodies, without {lacking}"
+        return f"{foreseen}, without friction: identify once, and give the result with --parameters."
     own = scara03_friction(model.robot)
     if own and all(own[name] == value for name, value in zip(model.names, design.nominal, strict=True) if name in own):
         return f"{foreseen} and the friction of the paper's Table 5 (OJD)."
-    return f"{foreseen}, or what was known better, and the friction that was given."
+    return f"{foreseen}, or with better values where known, and with the friction given."
 
 
 def _rotors_left_out(design: Design) -> str:
@@ -296,8 +298,8 @@ def _rotors_left_out(design: Design) -> str:
     worst = int(np.argmax(np.where(guessed > 0.0, peak / design.limits.torque, 0.0)))
     joints = _few([joint for joint, own in zip(robot.joints, guessed, strict=True) if own > 0.0], "joint")
     return (
-        f"the rotors of {joints}, which nobody stated (as large as motors of that size have, they would take {robot.joints[worst]} "
-        f"to some {peak[worst]:.2g} {robot.torque_unit(worst)} of {design.limits.torque[worst]:.2g})"
+        f"the rotors of {joints}, which are not stated (with typical rotors of such motors, {robot.joints[worst]} "
+        f"would reach about {peak[worst]:.2g} {robot.torque_unit(worst)} of {design.limits.torque[worst]:.2g})"
     )
 
 

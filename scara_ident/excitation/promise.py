@@ -89,7 +89,7 @@ class ExpectedAnswer:
         said = f"{self.before:.2g} standard errors apart so far, {self.after:.2g} expected with it."
         least = [f"{item.suspect.label}, {_size(item.limit)}" for item in self.shown if item.limit]
         if least:
-            said += f" The least that would be found: {'; '.join(least[:MAX_NAMED])}."
+            said += f" Smallest sizes that would be found: {'; '.join(least[:MAX_NAMED])}."
         return f"{said} {self.instead}".rstrip()
 
     @property
@@ -98,7 +98,7 @@ class ExpectedAnswer:
         if self.settled:
             return ""
         which = listed([item.label for item in self.hidden], MAX_NAMED) or self.question.text
-        return f"Would not tell: {which}. What would: {self.remedy}."
+        return f"This motion does not settle: {which}. To settle it: {self.remedy}."
 
     @property
     def remedy(self) -> str:

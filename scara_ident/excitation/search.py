@@ -47,14 +47,14 @@ UNSEEN = 1e-9
 
 @dataclass(frozen=True)
 class Effort:
-    """How long to search. The result depends on nothing else: not on the number of processes, nor on time.
+    """The amount of search. The result depends on this alone, not on the number of processes or on time.
 
     Attributes
     ----------
     starts : int
-        Searches from random motions, and as many per round.
+        Number of searches from random motions, and of searches per round.
     rounds : int
-        Rounds of searches from changes of the best motions so far.
+        Number of rounds of searches from variations of the best motions so far.
     seed : int
     processes : int or None
         None: as many as there are cores.
@@ -62,7 +62,7 @@ class Effort:
     Raises
     ------
     UsageError
-        If there is nothing to search from.
+        If there is no search at all.
     """
 
     starts: int = 8
@@ -121,8 +121,8 @@ def search(task: Task, effort: Effort, progress: Callable[[Progress], None] | No
     alike = _never_distinguished(task)
     if alike:
         raise InfeasibleLimits(
-            f"no motion can tell {', '.join(alike)} apart in the model {task.smooth.model.name}; use a model without "
-            "one of them, or give information about them"
+            f"no motion can distinguish {', '.join(alike)} in the model {task.smooth.model.name}; use a model without "
+            f"one of them, or give information about them"
         )
     problem = within_grid(task, COARSE, np.full(_rows(task), BOUND))
     total = effort.starts * (1 + effort.rounds)
@@ -260,8 +260,8 @@ def _tightest(problem: Problem, seed: int) -> str:
         what = "range" if kind == "position" else f"{kind} limit"
         where = f"{what} of {robot.joints[joint]}, {bound:.4g} {unit}"
     return (
-        f"no motion within the limits shows all parameters; the tightest is the {where}; "
-        "widen it, use more harmonics, or a model with fewer parameters"
+        f"no motion within the limits determines all parameters; the tightest limit is the {where}; widen it, use more "
+        f"harmonics, or a model with fewer parameters"
     )
 
 

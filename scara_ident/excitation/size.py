@@ -84,6 +84,6 @@ def check_size(chosen: int | Sequence[int], joints: int, trajectories: int, samp
         )
     if MIN_PER_PERIOD * highest > samples:
         raise UsageError(
-            f"harmonic {highest}: {samples} samples cannot tell so fast a motion; use at most "
+            f"harmonic {highest}: {samples} samples cannot resolve so fast a motion; use at most "
             f"{samples // MIN_PER_PERIOD}, or more samples"
         )

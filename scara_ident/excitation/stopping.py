@@ -90,21 +90,21 @@ class Stopping:
 
     def words(self) -> str:
         """Say it in a sentence, and what is not judged in another."""
-        unjudged = f" Not judged, as no value is known to take a percentage of: {', '.join(self.not_judged)}."
+        unjudged = f" Not judged, because no value is known to take a percentage of: {', '.join(self.not_judged)}."
         return f"{self._verdict()}{unjudged if self.not_judged else ''}"
 
     def _verdict(self) -> str:
         last, first = self.after[-1], self.suffices
-        worst = f"{last.parameter}, {last.std:.3g} where {last.asked:.3g} is asked"
+        worst = f"{last.parameter}, {last.std:.3g} instead of {last.asked:.3g}"
         if first == 0:
-            return "The recordings at hand are as sure as asked: no more of them pay."
+            return "The existing recordings reach the requested std: no more are needed."
         if first is not None:
             seconds = next(each.seconds for each in self.after if each.motions == first)
-            more = "" if first == last.motions else "; the others do not pay"
-            return f"Motion {first} of {last.motions}, at {seconds:g} s of arm time, suffices for the std asked{more}."
+            more = "" if first == last.motions else "; the others are not needed"
+            return f"Motion {first} of {last.motions}, at {seconds:g} s of arm time, is enough for the requested std{more}."
         if self.repetitions is None:
-            return f"No number of these motions gives the std asked: the farthest is {worst}."
-        return f"The std asked takes {self.repetitions} recordings of each motion: the farthest after one is {worst}."
+            return f"No number of these motions gives the requested std: the worst parameter is {worst}."
+        return f"The requested std takes {self.repetitions} recordings of each motion: after one the worst parameter is {worst}."
 
 
 def stopping(design: Design, asked: Mapping[str, float], not_judged: Sequence[str] = ()) -> Stopping:
@@ -185,7 +185,7 @@ def asked_std(words: Sequence[str], values: Mapping[str, float]) -> tuple[dict[s
         if not 0.0 < size < np.inf or (sign and text.endswith("%")):
             raise UsageError(f"--asked-std {word}: expected a percentage such as 5, or NAME=STD, such as a01=0.02")
         if sign and name not in values:
-            raise UsageError(f"--asked-std {word}: parameter {name!r} is not asked for; there are {', '.join(values)}")
+            raise UsageError(f"--asked-std {word}: parameter {name!r} is not among those judged: {', '.join(values)}")
         if sign:
             asked[name] = size
         else:

@@ -21,7 +21,7 @@ SPREAD = 0.5
 # Links of the arm that are never further apart than this touch by design, m.
 TOUCHING = 0.02
 # How a note begins that says why nothing at all is watched.
-UNWATCHED = "Collisions were not looked for"
+UNWATCHED = "Collisions were not checked"
 
 
 def clearance_of(
@@ -62,7 +62,7 @@ def clearance_of(
             raise UsageError(f"box at {centre} with edges {edges}: expected finite places and edges above 0, in m")
     kept = tuple((_triple(centre), _triple(edges)) for centre, edges in boxes)
     watched = Clearance(robot, float(margin), float(floor), kept, (), ())
-    unwatched = UNWATCHED + ": {}; rehearse the motion slowly."
+    unwatched = UNWATCHED + ": {}; run the motion slowly first."
     try:
         shapes = shapes_about(robot, watched.floor, watched.boxes)
     except RobotError as error:
@@ -76,7 +76,7 @@ def clearance_of(
         if count:
             lacks += " on the links that move" + (f" ({', '.join(bare)})" if bare else "")
         return replace(watched, notes=(unwatched.format(lacks),))
-    notes = (f"Links without a collision shape are not watched: {', '.join(bare)}.",) if bare else ()
+    notes = (f"Links without a collision shape are not checked: {', '.join(bare)}.",) if bare else ()
     pairs = [
         (i, j, "self")
         for i in range(count)
@@ -87,7 +87,7 @@ def clearance_of(
     ]
     pairs += [(i, count + k, name) for k, name in enumerate(obstacles) for i in range(count) if moved[i]]
     if not pairs:
-        return replace(watched, notes=(unwatched.format("all links that have shapes hang on one another"), *notes))
+        return replace(watched, notes=(unwatched.format("all links that have shapes are neighbours"), *notes))
     return _parted(replace(watched, pairs=tuple(pairs), notes=notes), lower, upper)
 
 
@@ -115,7 +115,7 @@ def _parted(watched: Clearance, lower: Array, upper: Array) -> Clearance:
     kept = tuple(pair for pair, never in zip(watched.pairs, touching, strict=True) if not never)
     room = distance[~touching].min(axis=1) - watched.margin
     likely = room < SPREAD * np.ptp(distance[~touching], axis=1)
-    said = f"Not kept {watched.margin:g} m apart, as they touch by design, or are nearer in every posture: {{}}."
+    said = f"Not kept {watched.margin:g} m apart, because they touch by design or are closer in every posture: {{}}."
     notes = (*watched.notes, said.format("; ".join(left_out))) if left_out else watched.notes
     return replace(watched, pairs=kept, notes=notes, likely=tuple(likely.tolist()))
 

@@ -118,7 +118,7 @@ def said_lines(word: str, said: Said) -> list[str]:
 
 def about_lines(found: IdentifiedModel, said: Said) -> tuple[str, ...]:
     """Say what a file's reader should know: errors, and what is missing."""
-    kind = "held out" if found.held_out[0] == "validation" else "on the recordings fitted"
+    kind = "held out" if found.held_out[0] == "validation" else "on the fitted recordings"
     model, own = found.errors(found.value), found.errors(said.value)
     lines = [
         f"{name}: rms error {kind} {_number(own[name])} {found.robot.torque_unit(j)}, of the model {_number(model[name])}."

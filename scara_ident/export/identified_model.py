@@ -93,7 +93,7 @@ class IdentifiedModel:
         """In words, which of the effects found the recordings held out speak against."""
         with_gain = [(item, HeldOutGain.of_entry(item["held_out"])) for item in self.found if item.get("held_out")]
         return tuple(
-            f"{item['effect']}{' of ' + item['joint'] if item['joint'] else ''} is in doubt: {shown_of(gain)} on the recordings held out"
+            f"{item['effect']}{' of ' + item['joint'] if item['joint'] else ''} is in doubt: {shown_of(gain)} on the held-out recordings"
             for item, gain in with_gain
             if gain.against()
         )

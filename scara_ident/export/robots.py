@@ -15,28 +15,28 @@ from scara_ident.identification.identify import Identification
 
 
 def export_urdf(found: Identification | Diagnosis, path: Path | str) -> tuple[str, ...]:
-    """Write the identified arm as a URDF: the robot's own file with other inertials and joint dynamics.
+    """Write the identified arm as a URDF: the robot's own file with identified inertials and joint dynamics.
 
-    Friction is fitted again to what the format has of it, see `scara_ident.export.forms`.
+    Friction is fitted again with the terms that the format has, see `scara_ident.export.forms`.
 
     Parameters
     ----------
     found : Identification or Diagnosis
         What `identify` or `diagnose` returned.
     path : path
-        File to write, whole or not at all.
+        File to write, completely or not at all.
 
     Returns
     -------
     tuple of str
-        What a person should know, and what the format cannot say.
+        Remarks for the user, and what the format cannot hold.
 
     Raises
     ------
     EstimationError
-        If no arm can have the identified parameters, or nearly.
+        If no arm can have the identified parameters, even approximately.
     ScaraIdentError
-        If a link cannot exist, or a file cannot be read or written.
+        If a link is physically impossible, or a file cannot be read or written.
 
     Examples
     --------
@@ -52,7 +52,7 @@ def export_urdf(found: Identification | Diagnosis, path: Path | str) -> tuple[st
 def export_mjcf(found: Identification | Diagnosis, path: Path | str) -> tuple[str, ...]:
     """Write the identified arm as a model of MuJoCo.
 
-    Parameters, results and errors are those of `export_urdf`; MuJoCo takes no moving link without mass.
+    Parameters, results and errors are those of `export_urdf`; in addition MuJoCo refuses a moving link without mass.
     """
     return _export(found, "mjcf", Path(path))
 

@@ -15,25 +15,25 @@ from scara_ident.robot.robot import Robot
 def load_estimate(path: Path | str, robot: Robot) -> Estimate:
     """Load the estimate of an ``identification.json`` or ``diagnosis.json``: parameters, covariance and triangular factor.
 
-    Predictions, standard deviations and information are those of the estimate that was saved. Of an identification they are
-    so bit by bit; of a diagnosis it is the estimate with the effects found. Recordings are not in the file.
+    Predictions, standard deviations and information are those of the saved estimate: for an identification bit by bit;
+    for a diagnosis of the estimate with the effects found. The file contains no recordings.
 
     Parameters
     ----------
     path : path
-        What `Identification.save`, `Diagnosis.save` or the commands ``identify`` and ``diagnose`` wrote.
+        A file written by `Identification.save`, `Diagnosis.save` or the commands ``identify`` and ``diagnose``.
     robot : Robot
-        The same robot; its model is built anew.
+        The same robot; its model is built again.
 
     Returns
     -------
     Estimate
-        A `ConsistentEstimate` where it was one.
+        A `ConsistentEstimate` if the saved one was.
 
     Raises
     ------
     ScaraIdentError
-        If the file cannot be read, holds no estimate, or is of another robot or model.
+        If the file cannot be read, contains no estimate, or belongs to another robot or model.
 
     Examples
     --------

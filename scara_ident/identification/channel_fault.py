@@ -57,29 +57,29 @@ class ChannelFault:
     def __str__(self) -> str:
         """Say what, and what to do."""
         before = f"{100 * self.error:.2g}" if self.error < 0.99 else f"{100 * self.error:.0f}"
-        gain = f"what is left of the torque falls from {before} to {100 * self.mended:.2g} %"
+        gain = f"the unexplained part of the torque falls from {before} to {100 * self.mended:.2g} %"
         names = (" and " if self.exchanged else ", ").join(self.joints)
         if self.unsigned:
             return (
-                f"effort of {names} seems to be logged without its sign: it never changes it, and with the signs that the "
-                f"motion asks for {gain}; log the effort with its sign"
+                f"effort of {names} seems to be logged without its sign: the sign never changes, and with the signs "
+                f"that the motion requires {gain}; log the effort with its sign"
             )
         if self.zeros:
             return self._elsewhere(gain)
         if self.exchanged:
             return (
-                f"{self.signal} of {names} look exchanged: the other way round {gain}; exchange their columns under "
-                f"recording: in robot.yaml"
+                f"{self.signal} of {names} look exchanged: with the columns exchanged {gain}; exchange their columns "
+                f"under recording: in robot.yaml"
             )
         if self.by_bodies:
             return (
-                f"{names}: the effort has the opposite sign: gravity and inertia would both be those of the URDF the other way "
-                "round; negate effort_gain of all in robot.yaml (effort_gain: -1 where none is given)"
+                f"{names}: the effort has the opposite sign: gravity and inertia both have the opposite sign of the "
+                f"URDF's; negate effort_gain of all in robot.yaml (effort_gain: -1 where none is given)"
             )
         if self.mended > MENDED * self.error:
             return (
-                f"{names}: the effort, or the position, has the opposite sign: friction would feed energy in, and no joint "
-                "speaks against it; negate effort_gain in robot.yaml"
+                f"{names}: the effort, or the position, has the opposite sign: friction feeds energy in on some joints "
+                f"and brakes on none; negate effort_gain in robot.yaml"
             )
         turn = {
             "effort": f"negate effort_gain of {names} in robot.yaml",
@@ -87,7 +87,7 @@ class ChannelFault:
             "effort and position": f"negate the axis of {names} in the URDF",
         }[self.signal]
         verb = "look" if self.signal == "effort and position" else "looks"
-        return f"{self.signal} of {names} {verb} like the opposite sign: turned round {gain}; {turn}"
+        return f"{self.signal} of {names} {verb} like the opposite sign: with the sign changed {gain}; {turn}"
 
     def _elsewhere(self, gain: str) -> str:
         """Say which zeros are elsewhere, and which lines mend it."""
@@ -95,17 +95,17 @@ class ChannelFault:
         verb = "counts" if len(each) == 1 else "count"
         turns = " and ".join(f"{_added(own)} on {joint}" for joint, own in each.items())
         lines = ", ".join(f"{joint}: {0.5 * math.pi * own.quarters:.5f}" for joint, own in each.items())
-        said = f"position of {', '.join(each)} {verb} from another zero than the URDF: with {turns} {gain}"
+        said = f"position of {', '.join(each)} {verb} from a zero that differs from the URDF's: with {turns} {gain}"
         if self.alternatives:
-            said += f" (as it does with {', or with '.join(self.alternatives)})"
+            said += f" (it does so too with {', or with '.join(self.alternatives)})"
         mend = ""
         for word, signal in (("position scale and offset", "position"), ("effort_gain", "effort")):
             own = [joint for joint, read in each.items() if signal in (read.signal or "")]
             if own:
                 mend += f"negate {word} of {', '.join(own)} in robot.yaml, "
         return (
-            f"{said}; {mend}{'then ' if mend else ''}add in robot.yaml under recording, position: offset: {{{lines}}} in rad, or as "
-            "much in the unit there"
+            f"{said}; {mend}{'then ' if mend else ''}add in robot.yaml under recording, position: offset: {{{lines}}} in "
+            f"rad, or the same angle in the unit there"
         )
 
 

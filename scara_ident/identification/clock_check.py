@@ -69,8 +69,8 @@ def clock_drift(value: Array, observations: Observations) -> str | None:
     longest = max(item.time[-1] - item.time[0] for item in observations.data.sources)
     return (
         f"effort drifts against position, by {100 * abs(rate):.2g} % of the time, {1e3 * abs(rate) * longest:.2g} ms over a run "
-        f"of {longest:.3g} s: they have two clocks, where nothing else changes over a run, as friction that warms up does; "
-        "parameters are off; record both by one clock"
+        f"of {longest:.3g} s: they have two clocks, unless something else changes during a run, such as friction that "
+        f"warms up; the parameters are wrong; record both with one clock"
     )
 
 

@@ -60,7 +60,7 @@ class TrajectorySummary:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Comparison(Saved, reported_by="comparison"):
-    """Every trajectory's parameters against every trajectory.
+    """The parameters of each trajectory, and their errors on every trajectory.
 
     Attributes
     ----------
@@ -71,10 +71,10 @@ class Comparison(Saved, reported_by="comparison"):
     errors : ndarray, shape (t, t, n)
         ``errors[i, k, j]``: rms error on trajectory i, joint j, of the parameters from trajectory k.
     expected : ndarray, shape (t, t, n)
-        The same as the covariance of the parameters and the error of i's own parameters predict it: where the
-        error is much larger, bias is at work and not noise. Infinite where k leaves open a parameter that the joint
-        depends on: nothing is known then of what noise explains. Where offsets of recordings make most of all errors, both
-        are beside an offset of each one's own.
+        The error predicted by the covariance of the parameters and the error of i's own parameters. A much larger error
+        is bias and not noise. Infinite if trajectory k does not determine a parameter that the joint depends on; the
+        error that noise explains is then not known. If offsets of recordings are the main part of all errors, both are
+        given after each recording's own offset is removed.
     notes : tuple of str
     """
 
@@ -100,7 +100,7 @@ def compare(
     bands: Sequence[float | None] | None = None,
     progress: Tell = silent,
 ) -> Comparison:
-    """Estimate from each trajectory alone and predict all of them.
+    """Estimate from each trajectory alone, and predict all trajectories with each estimate.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ def compare(
     Raises
     ------
     UsageError
-        If a band is no frequency that the slowest recording carries.
+        If a band is not positive or above half of the slowest sample rate.
     RecordingError
         If there are fewer than two trajectories, or none of the recordings can be used; one of several that cannot, or a trajectory with fewer rows than the model has
         parameters, is left out with a note.
@@ -154,7 +154,10 @@ def compare(
     names, rows = list(each), [own.by_joint for own in each.values()]
     if _offsets_differ(observations):
         rows = [_beside_own_offsets(own) for own in each.values()]
-        notes = [*notes, "offsets differ from recording to recording: errors are beside an offset of each one's own"]
+        notes = [
+            *notes,
+            "offsets differ from recording to recording: errors are given after each recording's own offset is removed",
+        ]
     summaries = []
     for k, (name, own) in enumerate(each.items()):
         progress(f"estimating from {name}", 0.5 + 0.4 * k / len(names))

@@ -118,7 +118,7 @@ class Event:
 
     def sentence(self, robot: Robot) -> str:
         """Return it in words."""
-        force = "" if self.force is None else f", {np.linalg.norm(self.force):.3g} N if at the tool"
+        force = "" if self.force is None else f", {np.linalg.norm(self.force):.3g} N if it acts at the tool"
         units = robot.torque_units
         where = ", ".join(f"{size:.3g} {units[joint]} on {joint}" for joint, size in self.sized)
         others = self.joints[len(self.sized) :]
@@ -126,7 +126,7 @@ class Event:
         done = "" if self.held_out else "; left out of the fit"
         if np.isinf(self.score):
             why = "" if self.kind == "unknown" else f" ({self.kind})"
-            return f"{self.recording} is explained much worse than the recordings fitted{why}: {where}{more}{done}"
+            return f"{self.recording} is explained much worse than the fitted recordings{why}: {where}{more}{done}"
         unsure = [
             f", {word} between {least:.2f} and {most:.2f} s"
             for word, (least, most) in (("beginning", self.begins or (0.0, 0.0)), ("ending", self.ends or (0.0, 0.0)))

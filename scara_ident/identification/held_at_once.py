@@ -36,8 +36,8 @@ def held_at_once(data: PreparedData, held_out: PreparedData) -> tuple[PreparedDa
     if not shown:
         return data, held_out, []
     note = (
-        f"{count} samples of {len(data.bands)} joints are more than a diagnosis holds at once ({most:.0f}): it looks at "
-        f"{' and '.join(shown)}, evenly over all; give the recordings that matter to choose others"
+        f"{count} samples of {len(data.bands)} joints are more than a diagnosis can hold at once ({most:.0f}): it uses "
+        f"{' and '.join(shown)}, evenly over all; to choose others give only the recordings that matter"
     )
     return kept, kept_out, [note]
 

@@ -49,27 +49,27 @@ _LOG = logging.getLogger(__name__)
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Identification(Saved, reported_by="identification"):
-    """Everything that one identification found.
+    """The result of one identification.
 
     Attributes
     ----------
     estimate : Estimate
     history : History or None
-        Of the recursive estimate.
+        History of the recursive estimate.
     bands : tuple of float or None
-        Low-pass on both sides of each joint's equation, Hz; None where nothing was filtered.
+        Low-pass of both sides of each joint's equation, Hz; None if not filtered.
     training, validation : Observations
-        What the recordings say; validation took no part in any choice.
+        Observations of the recordings; no choice used the validation recordings.
     noise : mapping of str to ndarray
         Repeatability of the torque per trajectory, see `repeatability`.
     log_det, condition : float
         J_d and J_k of the training recordings for the paper's 2500 samples.
     notes : tuple of str
-        What was found in the data and what was done about it.
+        Findings in the data, and how they were treated.
     events : tuple of Event
-        What is local in time: left out of the fit, or in recordings that were held out.
+        What happens in a part of the time: left out of the fit, or in held-out recordings.
     channels : tuple of ChannelFault
-        Signs that seem to be opposite.
+        Channels that seem to have the opposite sign.
     """
 
     estimate: Estimate
@@ -114,15 +114,15 @@ class Identification(Saved, reported_by="identification"):
 
     @cached_property
     def physical_consistency(self) -> PhysicalConsistency:
-        """Whether an arm with these parameters can exist, and what contradicts it; judged when it is first asked for."""
+        """Whether the parameters are physically consistent, and what contradicts it; computed at the first use."""
         return physical_consistency(self.estimate)
 
     def training_errors(self) -> dict[str, tuple[JointError | None, ...]]:
-        """Return the errors on the recordings that were fitted, by recording."""
+        """Return the errors on the training recordings, by recording."""
         return self._errors(self.training)
 
     def validation_errors(self) -> dict[str, tuple[JointError | None, ...]]:
-        """Return the errors on the recordings that were not, by recording."""
+        """Return the errors on the held-out recordings, by recording."""
         return self._errors(self.validation)
 
     def _errors(self, observations: Observations) -> dict[str, tuple[JointError | None, ...]]:
@@ -155,13 +155,13 @@ def identify(
         A name of `scara_ident.identification.ESTIMATORS`: ``wls`` (each joint weighted by its residual), ``ols`` (every
         row counts the same, as in Indri et al. 2002), ``rls``, ``consistent`` or an installed package's.
     validation : sequence of Recording, or of path, optional
-        Recordings that take no part in the fit nor in any choice.
+        Held-out recordings: neither the fit nor any choice uses them.
     bands : sequence of float or None, one per joint, optional
-        Low-pass on both sides of each joint's equation, Hz; chosen from the recordings by default.
+        Low-pass of both sides of each joint's equation, Hz; default: chosen from the recordings.
     options : ConsistentOptions, optional
-        Of the method ``consistent``: friction's shape, masses, centres of mass, priors.
+        Options of the method ``consistent``: shape of friction, masses, centres of mass, priors.
     progress : callable, optional
-        Called with every step that begins and the share of the work done before it.
+        Called at the begin of every step with its name and the share of the work done.
 
     Returns
     -------
@@ -170,11 +170,13 @@ def identify(
     Raises
     ------
     UsageError
-        If there are no recordings, the model or the method is unknown, a recording is both fitted and held out, a band is no frequency
-        that the slowest recording carries, or options are given to another method than ``consistent``; an `ArgumentError` where something of another kind is given.
+        If there are no recordings, the model or the method is unknown, a recording is both fitted and held out, a band
+        is not positive or above half of the slowest sample rate, or options are given with another method than
+        ``consistent``; `ArgumentError` if an argument is of the wrong kind.
     RecordingError
         If none of the recordings to fit can be used, or they have fewer rows than the model has parameters, or two joints are
-        exchanged or efforts have no sign (see `channel_faults`). One of several that cannot be used, or one that is held out, is left out with a note.
+        exchanged or efforts have no sign (see `channel_faults`). If one of several recordings, or a held-out one,
+        cannot be used, it is left out with a note.
 
     Examples
     --------
@@ -195,7 +197,7 @@ def identify(
     if not isinstance(options, ConsistentOptions | None):
         raise ArgumentError(f"options: expected ConsistentOptions; found {type(options).__name__}")
     if options is not None and method != "consistent":
-        raise UsageError(f"options: those of the method consistent; {method!r} takes none")
+        raise UsageError(f"options: these belong to the method consistent; {method!r} has no options")
     ESTIMATORS.get(method)  # a package that cannot be loaded is named before the work, not after it
     check_held_out(recordings, validation)
     equation = model_of(model, robot)

@@ -121,9 +121,9 @@ def _notes(recording: Recording, long: LongFile, held: _Absorbed) -> list[str]:
     count, known = len(long.parts), {finding.kind for finding in recording.findings}
     whole = "all" if held.samples == long.samples else "the"
     notes = [
-        f"{recording.name}: parameters, their standard deviations, events and errors within the band are of {whole} "
-        f"{held.samples} samples, read in {count} parts; "
-        f"bands, checks, unfiltered errors and pictures are of the {len(recording.time)} kept"
+        f"{recording.name}: parameters, their standard deviations, events and errors within the band are from {whole} "
+        f"{held.samples} samples, read in {count} parts; bands, checks, unfiltered errors and pictures are from the "
+        f"{len(recording.time)} samples kept"
     ]
     if held.refused:
         notes.append(f"{held.refused[0]}; left out, {len(held.refused)} of {count} parts in all")

@@ -117,7 +117,7 @@ def without_copies(recordings: Sequence[Recording]) -> tuple[list[Recording], li
         if share > MOSTLY:
             notes.append(f"{said}; left out")
         else:
-            notes.append(f"{said}, and count twice; give each once")
+            notes.append(f"{said}, so these samples count twice; give each recording once")
             kept.append(recording)
     return kept, notes
 
@@ -160,7 +160,7 @@ def with_rows(data: PreparedData, robot: Robot, *, needed: bool) -> tuple[Prepar
     said = (
         (
             str(item.recording.path or item.name),
-            f"{count} independent rows are left once the ends and the times at rest are left out{_because(item, robot)}; left out",
+            f"{count} independent rows remain without the ends and the times at rest{_because(item, robot)}; left out",
         )
         for item, count in zip(data.recordings, rows, strict=True)
         if count < MIN_ROWS

@@ -139,15 +139,15 @@ def _apart(diagnosis: Diagnosis) -> Iterator[NextStep]:
         place = names.index(name)
         length = sum(part.samples / part.rate for part in training.data.stretches if part.name == name)
         again = (
-            f"record its motion again: where it is gone, something was different in {name}, which is then to be left out",
+            f"record its motion again: if the difference is gone, something was different in {name}; then leave that recording out",
             length,
         )
         there = (
-            f"its motion was recorded without it too: find what was different in {name}, or leave it out",
+            f"other recordings of the same motion do not have it: find what was different in {name}, or leave that recording out",
             None,
         )
         motion, seconds = there if motions.count(motions[place]) > 1 else again
-        yield NextStep(f"what {name} alone has on {' and '.join(own)}", motion, seconds)
+        yield NextStep(f"what only {name} has on {' and '.join(own)}", motion, seconds)
 
 
 def _recordings(diagnosis: Diagnosis) -> Iterator[NextStep]:
@@ -158,14 +158,14 @@ def _recordings(diagnosis: Diagnosis) -> Iterator[NextStep]:
         longest = diagnosis.search.scene.duration
         yield NextStep(
             "whether the result holds elsewhere",
-            "record a trajectory that takes no part in the diagnosis and give it with --validate",
+            "record another trajectory for validation only, and give it with --validate",
             longest,
         )
-    speeds = "the same path at another speed, so that a lag in time is distinguished from what goes with speed"
+    speeds = "record the same path at another speed, to distinguish a delay from what depends on speed"
     correction = diagnosis.search.correction
     # Of what is less than a sample no motion tells more.
     if correction is not None and correction.negligible(diagnosis.search.scene) is None:
-        yield NextStep("the delay that was taken out", speeds, diagnosis.search.scene.duration)
+        yield NextStep("the delay that was corrected", speeds, diagnosis.search.scene.duration)
 
 
 def _confirmations(diagnosis: Diagnosis) -> Iterator[NextStep]:
@@ -197,7 +197,7 @@ def _faint(diagnosis: Diagnosis) -> Iterator[NextStep]:
         yield NextStep(f"to judge {with_reasons(members)}", settled_by(diagnosis.search, members[:MAX_LABELS]))
     for members in list(hidden.values())[:MAX_EFFECTS]:
         labels = listed([member.label for member in members], MAX_LABELS, " and ")
-        said = f"to see {labels} at all, which these recordings cannot show"
+        said = f"to see {labels}, which these recordings cannot show at all"
         yield NextStep(said, members[0].candidate.effect.experiment)
 
 

@@ -26,9 +26,7 @@ MAX_CONFOUNDERS, MAX_PER_FAMILY, MAX_BELOW_LIMIT, MAX_NAMED = 4, 2, 24, 3
 # Of one suspect against another, at most.
 MAX_ODDS = 100.0
 # What tells a remainder that no signal of the motion is known to make.
-HALF_THE_SPEED = (
-    "repeat one trajectory at half the speed; how the remainder scales tells friction from inertia and from delays"
-)
+HALF_THE_SPEED = "repeat one trajectory at half the speed; the scaling of the remainder distinguishes friction from inertia and from delays"
 # Parameters asked for, and the standard deviation over the size that makes one unsure.
 MAX_PARAMETERS, UNSURE_SHARE = 3, 0.3
 
@@ -150,7 +148,7 @@ def suspect_of(entry: Mapping[str, Any]) -> Suspect:
     """
     families = EFFECTS.get(entry["effect"])
     if not 0 <= entry["variant"] < len(families):
-        raise ScaraIdentError(f"effect {entry['effect']}: not as the diagnosis had it; diagnose again")
+        raise ScaraIdentError(f"effect {entry['effect']}: not the one that the diagnosis had; diagnose again")
     nonlinear, value = (tuple(float(x) for x in entry[key]) for key in ("nonlinear", "value"))
     intervals = tuple(Interval(*item) for item in entry.get("intervals", ()))
     member = Member(entry["place"], nonlinear, entry["partner"], intervals)
@@ -252,7 +250,7 @@ def _below_limit(diagnosis: Diagnosis, asked: set[str]) -> Iterator[Question]:
         suspects.append(Suspect(decision.candidate, decision.label, tuple(float(x) for x in value), _odds(decision)))
     if suspects:
         chosen = tuple(suspects[:MAX_BELOW_LIMIT])
-        text = f"what these recordings hardly show: {listed([item.label for item in chosen], MAX_NAMED)}"
+        text = f"effects that these recordings hardly excite: {listed([item.label for item in chosen], MAX_NAMED)}"
         yield Question("below_limit", text, chosen, experiment="record another motion over the whole workspace")
 
 

@@ -47,17 +47,17 @@ class BaseParameters(Frozen):
     Attributes
     ----------
     standard_names : tuple of str
-        Names of the p standard parameters; a body's number is its joint's place in the robot description.
+        Names of the p standard parameters; bodies are numbered like their joints in the robot description.
     standard_units : tuple of str
     kept : ndarray of int, shape (b,)
         The standard parameter that leads each base parameter.
     grouping : ndarray, shape (b, p)
-        The sums, exact but for `approximate`; column ``kept[i]`` is the unit vector e_i.
+        The sums, exact except for `approximate`; column ``kept[i]`` is the unit vector e_i.
     absent : tuple of int
-        Standard parameters that never enter the torque.
+        Standard parameters that never appear in the torque.
     approximate : tuple of (int, float)
-        Standard parameters regrouped or left out although a small share of their column, given here, is
-        independent: usually an angle in the URDF with few digits.
+        Standard parameters that are grouped with others or left out although a small share of their column, given here,
+        is independent; the usual cause is an angle in the URDF with too few digits.
     reduction : ndarray, shape (n,)
         Reductions, to write armatures as rotor inertias.
     """
@@ -109,7 +109,7 @@ class BaseParameters(Frozen):
         return f"Jm{k - first + 1}", float(self.reduction[k - first] ** 2)
 
     def only_in_sums(self) -> tuple[int, ...]:
-        """Return the standard parameters that enter the torque but only together with others."""
+        """Return the standard parameters that appear in the torque only together with others."""
         entering = np.flatnonzero(np.any(self.grouping != 0.0, axis=0))
         alone = {int(k) for i, k in enumerate(self.kept) if np.count_nonzero(self.grouping[i]) == 1}
         return tuple(int(k) for k in entering if int(k) not in alone)
@@ -144,9 +144,9 @@ def find_base_parameters(robot: Robot, *, rotor_inertia: bool = True, seed: int 
     ----------
     robot : Robot
     rotor_inertia : bool, optional
-        Whether the rotors' inertias are parameters too.
+        Whether the rotor inertias are parameters too.
     seed : int, optional
-        Seed of the random states; it does not change the result, which the tests hold.
+        Seed of the random states; it does not change the result, as the tests check.
 
     Returns
     -------
@@ -155,7 +155,7 @@ def find_base_parameters(robot: Robot, *, rotor_inertia: bool = True, seed: int 
     Raises
     ------
     RobotError
-        When no parameter enters the torque.
+        If no parameter appears in the torque.
 
     References
     ----------

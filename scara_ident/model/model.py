@@ -61,11 +61,11 @@ class TorqueModel(Frozen):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """In words, what the model leaves out as no recording tells it."""
+        """Notes on what the model leaves out because no recording determines it."""
         return tuple(note for term in self.terms if isinstance(term, Offset) for note in term.notes())
 
     def place(self, term: Term) -> slice:
-        """Return where a term's columns stand among the p."""
+        """Return the places of a term's columns among the p."""
         start = 0
         for other in self.terms:
             if other is term:
@@ -75,9 +75,9 @@ class TorqueModel(Frozen):
 
     @cached_property
     def constants(self) -> Array:
-        """What one unit of offset of each joint is on its rows as a sum of the columns, shape (n, p).
+        """One unit of offset of each joint as a combination of the columns on its rows, shape (n, p).
 
-        Where weight stands for it (`Offset.left_out`) that is a sum of bodies; zero for a model without offsets.
+        If weight replaces it (`Offset.left_out`) this is a combination of bodies; zero for a model without offsets.
         """
         weights = np.zeros((self.robot.n, len(self.columns)))
         for term in (term for term in self.terms if isinstance(term, Offset)):

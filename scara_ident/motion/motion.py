@@ -39,14 +39,14 @@ class Motion(Frozen):
     q, v, a : ndarray, shape (n, N)
         Position, velocity and acceleration in the order of the robot's joints.
     torque : ndarray, shape (n, N) or None
-        Recorded torque, as it was recorded (not filtered).
+        Recorded torque, not filtered.
     rate : float
         Samples per second.
     fade : ndarray, shape (n, N), or None
-        Weight of every sample of each joint's torque, 0 where the joint stands still and friction is unknown, see `fading`;
-        None where nothing is said of it.
+        Weight of every sample of each joint's torque, 0 where the joint stands still and friction is unknown, see
+        `fading`; None if not given.
     cuts : tuple of float or None, one per joint
-        Low-pass that its positions passed, Hz; empty where none did.
+        Low-pass of the positions, Hz; empty if not filtered.
     """
 
     name: str
@@ -69,7 +69,7 @@ class Motion(Frozen):
 
     @property
     def kinematics(self) -> Motion:
-        """The first of the motions that differ by their torque alone, by which is kept what follows from the others' state too."""
+        """The first of the motions that differ only in torque; results that depend only on the state are kept under it."""
         return self if self._same is None else self._same
 
     def with_torque(self, torque: Array | None) -> Motion:
@@ -172,7 +172,8 @@ class Stretch:
 def stretches(recording: Recording) -> tuple[Stretch, ...]:
     """Cut a recording at its gaps and put each part on a uniform time grid.
 
-    Jittered positions are interpolated by a cubic spline, torque linearly, at the rate of the samples, those dropped counted in.
+    Positions with time jitter are interpolated by a cubic spline, torque linearly, at the sample rate, which includes
+    dropped samples.
 
     Parameters
     ----------
@@ -272,12 +273,12 @@ def motion_of(stretch: Stretch, cuts: Sequence[float | None]) -> Motion:
     ----------
     stretch : Stretch
     cuts : sequence of float or None, one per joint
-        Cut-off frequency of each joint's position in Hz; None filters nothing.
+        Cutoff frequency of each joint's position in Hz; None: not filtered.
 
     Returns
     -------
     Motion
-        On the stretch's whole time grid; its ends carry the continuation's guess.
+        On the whole time grid of the stretch; its ends contain an extrapolation.
     """
     wanted = dict(zip(range(len(stretch.position)), cuts, strict=True))
     stretch.filter_all(wanted)

@@ -287,7 +287,7 @@ class PreparedRecording:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PreparedData(Frozen):
-    """Recordings made ready for one choice of bands.
+    """Recordings prepared for one choice of bands.
 
     Attributes
     ----------
@@ -303,7 +303,7 @@ class PreparedData(Frozen):
 
     @property
     def motions(self) -> Trajectories:
-        """Which recordings have the same motion, found once for all bands; of a part, as in the whole."""
+        """Which recordings have the same motion, computed once for all bands; for a part, as in the whole."""
         if self._part_of is not None:
             return self._part_of[0].motions.of(self._part_of[1])
         self._motions[:] = self._motions or [trajectories_of([item.longest.stretch for item in self.recordings])]
@@ -311,7 +311,7 @@ class PreparedData(Frozen):
 
     @property
     def periods(self) -> tuple[Periods | None, ...]:
-        """Where each recording repeats its own motion, or None where it does not; found once for all bands."""
+        """Where each recording repeats its own motion, None if it does not; computed once for all bands."""
         if self._part_of is not None:
             whole, places = self._part_of
             return tuple(whole.periods[k] for k in places)
@@ -340,7 +340,7 @@ class PreparedData(Frozen):
         return tuple(part for item in self.recordings for part in item.stretches)
 
     def at(self, bands: Bands) -> PreparedData:
-        """Return the recordings in other bands; what does not depend on them is shared."""
+        """Return the recordings in other bands; results that do not depend on the bands are shared."""
         return replace(self, recordings=tuple(item.at(bands) for item in self.recordings), bands=tuple(bands))
 
     def of(self, places: Sequence[int]) -> PreparedData:
@@ -349,13 +349,13 @@ class PreparedData(Frozen):
 
 
 def prepare(recordings: Sequence[Recording], bands: Bands = ()) -> PreparedData:
-    """Cut recordings at their gaps and make them ready for a choice of bands.
+    """Cut recordings at their gaps and prepare them for a choice of bands.
 
     Parameters
     ----------
     recordings : sequence of Recording
     bands : sequence of float or None, one per joint, optional
-        Low-pass on both sides of each joint's equation, Hz; not filtered by default.
+        Low-pass of both sides of each joint's equation, Hz; default: not filtered.
 
     Returns
     -------
@@ -364,7 +364,7 @@ def prepare(recordings: Sequence[Recording], bands: Bands = ()) -> PreparedData:
     Raises
     ------
     UsageError
-        If bands are not one for each joint, or one is no frequency.
+        If there is not one band for each joint, or a band is not positive.
     RecordingError
         If a recording has no stretch that is long enough.
     """

@@ -43,7 +43,7 @@ class Recording(Reported, reported_by="recording"):
     trajectory : str
         The stem without a trailing ``_<number>``.
     repetition : int
-        That number, 1 where the stem has none.
+        That number; 1 if the stem has none.
     joints : tuple of str
         The n joints, in the robot's order.
     time : ndarray, shape (N,)
@@ -53,24 +53,24 @@ class Recording(Reported, reported_by="recording"):
     effort : ndarray, shape (n, N), or None
         Torque in N m or force in N on the robot's effort side, after ``effort_gain``.
     velocity, acceleration : ndarray, shape (n, N), or None
-        As recorded, in rad/s (m/s) and rad/s^2 (m/s^2); None where they are absent for any joint.
+        As recorded, in rad/s (m/s) and rad/s^2 (m/s^2); None if absent for any joint.
     temperature : ndarray, shape (n, N), or None
         In deg C.
     link_position : ndarray, shape (n, N), or None
-        Of a second encoder behind the gear, in rad or m; NaN for a joint without one, None where there is none.
+        From a second encoder behind the gear, in rad or m; NaN for a joint without one, None if no joint has one.
     findings : tuple of Finding
-        What the audit saw in the file and did about it.
+        Findings of the audit, and how they were treated.
     path : Path or None
         The file that it was read from.
     long : LongFile or None
-        The file, where it is too long to hold and this is only what is kept of it; see `read_parts`.
+        The file, if it is too long for the memory and the recording is only the part kept of it; see `read_parts`.
     cuts : tuple of int
-        Samples before which a part of a long file is cut, as the whole is.
+        Samples before which a part of a long file is cut, like the whole file.
 
     Raises
     ------
     RecordingError
-        If shapes disagree or time does not grow.
+        If shapes disagree or time does not increase.
     """
 
     name: str
@@ -128,17 +128,16 @@ def read_recording(path: Path | str, robot: Robot, *, need_effort: bool = True) 
     Parameters
     ----------
     path : path
-        A file of a kind that `scara_ident.recording.files` knows by its suffix, or the folder of a rosbag2 recording.
+        A file with a suffix known to `scara_ident.recording.files`, or the folder of a rosbag2 recording.
     robot : Robot
-        Says which joints are wanted, in which order, in which columns and units they stand, and what a recorded
-        effort is worth.
+        It defines the joints, their order, their columns and units, and the gain of the recorded effort.
     need_effort : bool
-        Whether a file without efforts is refused. Where they are not needed, efforts are read if they are complete.
+        Whether a file without efforts is refused. If False, efforts are read if they are complete.
 
     Returns
     -------
     Recording
-        Of a Parquet file of more than `scara_ident.recording.long_file.LONGEST_WHOLE` samples windows spread over it.
+        For a Parquet file of more than `scara_ident.recording.long_file.LONGEST_WHOLE` samples: windows spread over it.
 
     Raises
     ------
@@ -336,7 +335,7 @@ def read_recordings(
     Parameters
     ----------
     words : path or str, or a sequence of these
-        Each a file, a folder (its recordings in natural order, not those of its folders; the folder of a rosbag2
+        Each is a file, a folder (its recordings in natural order, without sub-folders; the folder of a rosbag2
         recording is one recording) or a glob.
     robot : Robot
         See `read_recording`.
@@ -351,9 +350,10 @@ def read_recordings(
     Raises
     ------
     UsageError
-        A word that is no file, folder or matching glob.
+        If a word is no file, folder or matching glob.
     RecordingError
-        A folder or glob without recordings, two files of one stem in one folder, or a recording that cannot be used.
+        If a folder or glob has no recordings, two files in one folder have the same stem, or a recording cannot be
+        used.
 
     Examples
     --------
@@ -379,7 +379,7 @@ def distinctly_named(recordings: Sequence[Recording]) -> tuple[Recording, ...]:
 
 
 def write_recording(recording: Recording, path: Path | str, *, effort_gain: Array | None = None) -> None:
-    """Write a recording to a file, whole or not at all.
+    """Write a recording to a file, completely or not at all.
 
     Parameters
     ----------
@@ -392,6 +392,6 @@ def write_recording(recording: Recording, path: Path | str, *, effort_gain: Arra
     Raises
     ------
     RecordingError
-        Another suffix, or a place that cannot be written to.
+        If the suffix is another one, or the file cannot be written.
     """
     write_columns(Path(path), recording_columns(recording, effort_gain))

@@ -35,24 +35,24 @@ def read_arrays(
     velocity: ArrayLike | None = None,
     name: str = "arrays",
 ) -> Recording:
-    """Make a recording of arrays and audit it, as `read_recording` does with a file.
+    """Make a recording from arrays and audit it, as `read_recording` does with a file.
 
-    What the robot's description says under ``recording`` (columns, units, scales, offsets) is for files and data frames. Arrays
-    are taken as they are, and where there is such a mapping a finding says so.
+    The mapping under ``recording`` of the robot description (columns, units, scales, offsets) is for files and data
+    frames. Arrays are used as they are; if there is such a mapping, a finding says so.
 
     Parameters
     ----------
     time : array_like, shape (N,)
-        In s; points in time (``datetime64``) count from the first.
+        In s; points in time (``datetime64``) are counted from the first.
     position : array_like, shape (N, n)
-        In rad or m, a column for each of ``robot.joints``; (N,) will do for one joint.
+        In rad or m, one column for each of ``robot.joints``; shape (N,) is allowed for one joint.
     effort : array_like, shape (N, n), or None
-        As recorded: ``effort_gain`` makes N m (N) of it.
+        As recorded; ``effort_gain`` converts it to N m (N).
     robot : Robot
     velocity : array_like, shape (N, n), optional
         In rad/s or m/s.
     name : str, optional
-        Of the recording: ``<trajectory>_<repetition>``, as a file's stem.
+        Name of the recording: ``<trajectory>_<repetition>``, like a file's stem.
 
     Returns
     -------
@@ -61,9 +61,9 @@ def read_arrays(
     Raises
     ------
     ArgumentError
-        `robot` is no robot, or an array holds no real numbers.
+        If `robot` is no robot, or an array contains no real numbers.
     RecordingError
-        Shapes disagree, or the audit refuses the samples.
+        If shapes disagree, or the audit refuses the samples.
 
     Examples
     --------
@@ -105,13 +105,13 @@ def read_arrays(
 
 
 def read_frame(frame: Any, robot: Robot, *, name: str = "frame", need_effort: bool = True) -> Recording:
-    """Make a recording of a data frame and audit it, as `read_recording` does with a file.
+    """Make a recording from a data frame and audit it, as `read_recording` does with a file.
 
     Parameters
     ----------
     frame : polars.DataFrame or pandas.DataFrame
-        With the columns that the robot description names, else ``time``, ``<joint>.position``, ``<joint>.effort``. Of
-        pandas the index may be the time.
+        With the columns that the robot description names, otherwise ``time``, ``<joint>.position``, ``<joint>.effort``.
+        The index of a pandas frame may be the time.
     robot : Robot
     name : str, optional
         See `read_arrays`.
@@ -125,9 +125,9 @@ def read_frame(frame: Any, robot: Robot, *, name: str = "frame", need_effort: bo
     Raises
     ------
     ArgumentError
-        Not a data frame, or no robot.
+        If the frame is no data frame, or the robot no robot.
     RecordingError
-        A column is missing or holds no numbers, or the audit refuses the samples.
+        If a column is missing or contains no numbers, or the audit refuses the samples.
     """
     check_robot(robot)
     if hasattr(frame, "collect"):

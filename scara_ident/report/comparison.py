@@ -126,7 +126,7 @@ def comparison_sentences(comparison: Comparison) -> tuple[str, ...]:
     if np.count_nonzero(~open_) > 1:
         best = int(np.argmin(np.where(open_, np.inf, ratio)))
         worst = int(np.argmax(np.where(open_, -np.inf, ratio)))
-        whose = "Of those ranked, parameters" if np.any(open_) else "Parameters"
+        whose = "Of the ranked trajectories, parameters" if np.any(open_) else "Parameters"
         found.append(
             f"{whose} from {names[best]} predict all trajectories best ({ratio[best]:.2f} times each one's own error), "
             f"those from {names[worst]} worst ({ratio[worst]:.3g} times)."
@@ -135,12 +135,12 @@ def comparison_sentences(comparison: Comparison) -> tuple[str, ...]:
     i, k, j = np.unravel_index(int(np.nanargmax(np.where(np.isfinite(beyond), beyond, -1.0))), beyond.shape)
     if beyond[i, k, j] > 2.0:
         found.append(
-            f"Bias, not noise, is at work where {names[k]} predicts {names[i]} on {comparison.model.robot.joints[j]}: "
-            f"the error is {beyond[i, k, j]:.3g} times what the parameters' covariance promises."
+            f"The error of the parameters from {names[k]} on {names[i]}, {comparison.model.robot.joints[j]}, is bias "
+            f"and not noise: it is {beyond[i, k, j]:.3g} times the error that the parameters' covariance predicts."
         )
     elif np.any(np.isfinite(comparison.expected)):
         which = "other error" if np.any(open_) else "error"
-        found.append(f"No {which} exceeds twice what noise in the parameters explains.")
+        found.append(f"No {which} exceeds twice the error that noise in the parameters explains.")
     found += [_left_open(summary) for summary, still in zip(comparison.trajectories, open_, strict=True) if still]
     equal = all(np.ptp(summary.estimate.weights) == 0.0 for summary in comparison.trajectories)
     weights = "every row of every joint counts the same" if equal else "each joint is weighted by its residual"
@@ -154,6 +154,6 @@ def _left_open(summary: TrajectorySummary) -> str:
     estimate = summary.estimate
     missing = [name for name, std in zip(estimate.model.names, estimate.std, strict=True) if not np.isfinite(std)]
     return (
-        f"Parameters from {summary.name} are not ranked: no standard deviation could be had of {listed(missing, 3)}, so "
-        "what noise explains is not known where a dash stands for it."
+        f"Parameters from {summary.name} are not ranked: no standard deviation is known for {listed(missing, 3)}, so the error "
+        f"that noise explains is not known; the table has a dash there."
     )

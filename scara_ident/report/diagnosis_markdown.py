@@ -55,7 +55,7 @@ def diagnosis_markdown(
             for m in content["moved"]
         ]
         head = ("name", "URDF", "before", "after", "in std")
-        lines += _table("Parameters that moved when the effects came in", head, rows)
+        lines += _table("Parameters that changed when the effects were added", head, rows)
     lines += _certainty(content, diagnosis)
     shown = beyond_chance(content["candidates"])
     rows = [(row["label"], f"{row['gain']:.2%}", f"{row['p_value']:.1e}", row["decision"], row["why"]) for row in shown]
@@ -70,7 +70,9 @@ def diagnosis_markdown(
             )
             for row in content["not_identifiable"]
         ]  # fmt: skip
-        lines += _table("What no such recording can show", ("effect", "joints", "absorbed by", "opened by"), rows)
+        lines += _table(
+            "What no recording of this kind can show", ("effect", "joints", "absorbed by", "opened by"), rows
+        )
     if content["worth"] is not None:
         lines += ["", "## What the effects cost", "", *content["worth"]["summary"]]
     return "\n".join(lines) + "\n"
@@ -97,7 +99,7 @@ def _certainty(content: Mapping[str, Any], diagnosis: Diagnosis) -> list[str]:
             for row in content["tentative"]
         ]  # fmt: skip
         head = ("effect", "joint", "gain", "p over all tried", "why not", "settled by")
-        lines += _table("Worth a look, not added", head, rows)
+        lines += _table("Worth a look, not added to the model", head, rows)
     rows = [
         (joint, "yes" if row["noise"] else "no", row["by"] or "-", _cell(row["detection_limit"], True), row["why"])
         for joint, row in content["evidence"].items()

@@ -50,7 +50,7 @@ def _others(diagnosis: Diagnosis) -> list[str]:
         found += [_directly(name, parameter, effect.parameters[name]) for name, parameter in effect.direct.items()]
         if effect.confounded_with:
             others = ", ".join(effect.confounder_names(diagnosis.search.scene))
-            found.append(f"These recordings cannot tell it from: {others}.")
+            found.append(f"These recordings cannot distinguish it from: {others}.")
     if diagnosis.verdict == "undecided":
         found += [*_to_do_first(diagnosis), *_not_shown(diagnosis.evidence)]
     elif diagnosis.unexplained is not None:
@@ -63,7 +63,7 @@ def _others(diagnosis: Diagnosis) -> list[str]:
         where = f" on {guess.joint}" if guess.joint else ""
         gain = f"would remove {max(guess.gain, 0.0):.0%} of the squared residual"
         found.append(
-            f"Worth a look, not added: {guess.effect}{where}, {gain}; {guess.why}; settled by: {guess.settled_by}."
+            f"Worth a look, not added: {guess.effect}{where}, {gain}; {guess.why}; to settle it: {guess.settled_by}."
         )
     found += [
         _of_rotor(rotor, diagnosis) for rotor in diagnosis.rotors if not rotor.stated and rotor.factor is not None
@@ -90,8 +90,8 @@ def _headline(diagnosis: Diagnosis) -> list[str]:
         unit = diagnosis.robot.torque_unit(diagnosis.robot.joints.index(remainder.joint))
         on = f"depends on {' and '.join(remainder.signals)}" if remainder.signals else "repeats from run to run"
         found.append(
-            f"Unexplained: on {remainder.joint} a remainder of {remainder.rms:.3g} {unit} rms {on}; "
-            f"no effect of the catalogue accounts for it{_as_no_arm(diagnosis, remainder)}{_curved(diagnosis, remainder)}."
+            f"Unexplained: on {remainder.joint} a remainder of {remainder.rms:.3g} {unit} rms {on}; no effect of the "
+            f"catalogue explains it{_as_no_arm(diagnosis, remainder)}{_curved(diagnosis, remainder)}."
         )
         if not remainder.signals:
             found += _to_do_first(diagnosis)
@@ -115,8 +115,8 @@ def _errors(diagnosis: Diagnosis) -> list[str]:
     found = [f"Rms error on the {kind} recordings: {'; '.join(changes)}."]
     worse = [f"{joint} ({b / a:.2g} times)" for joint, a, b in errors if b > WORSE_RATIO * a > 0.0]
     if worse:
-        instead = "there use the model without it, or fit further motions"
-        found.append(f"Worse with what was found than without: {', '.join(worse)}; {instead}.")
+        instead = "there use the model without the effects, or fit more motions"
+        found.append(f"Worse with the effects than without them: {', '.join(worse)}; {instead}.")
     return found
 
 
@@ -151,7 +151,7 @@ def _curved(diagnosis: Diagnosis, remainder: Unexplained) -> str:
     laws = [term for term in diagnosis.before.model.terms if isinstance(term, Friction)]
     straight = all(max(law.powers) < 2 for law in laws)
     if straight and remainder.signals == (f"velocity of {remainder.joint}",):
-        return ", but the model's friction is straight in speed: try --model complete"
+        return "; the model's friction is linear in speed: try --model complete"
     return ""
 
 
@@ -166,15 +166,15 @@ def _as_no_arm(diagnosis: Diagnosis, remainder: Unexplained) -> str:
     if not like:
         return ""
     best = max(like, key=lambda item: item.as_no_arm)
-    return f"; it goes as {best.label} does, which removes {best.as_no_arm:.0%} of what is left there, squared, but {best.why}"
+    return f"; it looks like {best.label}, which removes {best.as_no_arm:.0%} of the squared residual there, but {best.why}"
 
 
 def _undecided(diagnosis: Diagnosis) -> str:
     """Say whether it is open that something is missing, or only what it is."""
     lacking = [item.joint for item in diagnosis.evidence if item.lacks]
-    more = "something more is missing than was found" if diagnosis.effects else "something is missing"
+    more = "something else is missing too" if diagnosis.effects else "something is missing"
     if lacking:
-        return f"Undecided: {more}, on {' and '.join(lacking)}, that these recordings cannot name."
+        return f"Undecided: {more} on {' and '.join(lacking)}, but these recordings cannot show what it is."
     return f"Undecided: these recordings cannot tell whether {more}."
 
 
@@ -203,16 +203,16 @@ def _found(effect: FoundEffect, diagnosis: Diagnosis) -> list[str]:
     if not effect.size_determined and not doubted:
         # As little as p may be, it is more than nothing.
         chance = f"p = {effect.p_value:.1e}" if effect.p_value else "p < 1e-300"
-        said += f"; it is there by what it removes ({chance}), but its size is not settled"
+        said += f"; it is significant ({chance}), but its size is not determined"
     if gain is None:
         return [f"Found {said}."]
     if gain.borne_out(criteria):
-        return [f"Found {said}; {shown_of(gain)} on the recordings held out."]
+        return [f"Found {said}; {shown_of(gain)} on the held-out recordings."]
     words = words_of(gain, diagnosis.robot.torque_unit(diagnosis.robot.joints.index(gain.joint)))
     if doubted:
-        instead = "record further motions to fit"
-        return [f"In doubt: {said}.", f"Not borne out by the recordings held out: {words}; {instead}."]
-    return [f"Found {said}.", f"Not confirmed by the recordings held out: {words}."]
+        instead = "record more motions to fit"
+        return [f"In doubt: {said}.", f"Not supported by the held-out recordings: {words}; {instead}."]
+    return [f"Found {said}.", f"Not confirmed by the held-out recordings: {words}."]
 
 
 def _directly(name: str, headline_and_details: Parameter, fitted: Parameter) -> str:
@@ -220,20 +220,20 @@ def _directly(name: str, headline_and_details: Parameter, fitted: Parameter) -> 
     same = abs(headline_and_details.value - fitted.value) <= DIFFERENT_STDS * np.hypot(
         headline_and_details.std, fitted.std
     )
-    agree = "which agrees" if same else "which differs by more than their uncertainty"
-    return f"A channel of its own, without this fit, tells {quantity(name, headline_and_details)}, {agree}."
+    agree = "which agrees" if same else "which differs by more than the uncertainty"
+    return f"A separate channel, without this fit, gives {quantity(name, headline_and_details)}, {agree}."
 
 
 def _of_rotor(rotor: RotorInertia, diagnosis: Diagnosis) -> str:
     """Say which inertia of a rotor that nobody stated the result rests on."""
     unit = diagnosis.robot.armature_unit(diagnosis.robot.joints.index(rotor.joint))
-    guess = f"guessed at {rotor.nominal:.2g} {unit} at the joint from the size of its motor"
+    guess = f"it was guessed as {rotor.nominal:.2g} {unit} at the joint from the size of the motor"
     if rotor.determined and rotor.factor is not None:
         near = f"{rotor.armature:.3g} ± {rotor.armature * np.log(rotor.factor):.1g} {unit}"
         far = f"{rotor.armature:.2g} {unit} within a factor of {rotor.factor:.2g}"
         found = near if rotor.factor < NEAR_FACTOR else far
-        return f"The rotor inertia of {rotor.joint} is not stated: {guess}, and found to be {found}."
+        return f"The rotor inertia of {rotor.joint} is not stated: {guess} and identified as {found}."
     return (
-        f"The rotor inertia of {rotor.joint} is not stated and hardly shows: {guess}, which may err by a factor of "
-        f"{GUESS_FACTOR:g}; what depends on it is as unsure as its ± says. State rotor_inertia."
+        f"The rotor inertia of {rotor.joint} is not stated and the data hardly determine it: {guess}, which may be "
+        f"wrong by a factor of {GUESS_FACTOR:g}; parameters that depend on it have a large ±. State rotor_inertia."
     )

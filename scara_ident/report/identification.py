@@ -40,9 +40,9 @@ MAX_NAMED = 12
 NUMBERS = {1: "one recording", 2: "two recordings"}
 # What each shape of friction means.
 SHAPES = {
-    "lubricated": "takes energy out, and grows ever less with speed",
-    "dissipative": "takes energy out",
-    "free": "anything",
+    "lubricated": "dissipates energy, and grows less and less with speed",
+    "dissipative": "dissipates energy",
+    "free": "no constraint",
 }
 
 
@@ -142,35 +142,37 @@ def _others(identification: Identification) -> list[str]:
     if worst is not None:
         recording, joint, error = worst
         rms, share = error.beside_own_offset
-        beside = "" if error.rms_own_offset is None else " beside an offset of its own"
+        beside = "" if error.rms_own_offset is None else " after its own offset is removed"
         unit = robot.torque_unit(robot.joints.index(joint))
         found.append(
-            f"It generalises worst to {recording}, {joint}: {rms:.3g} {unit} rms{beside}, {share:.1%} of the torque."
+            f"The largest held-out error is on {recording}, {joint}: {rms:.3g} {unit} rms{beside}, {share:.1%} of the torque."
         )
     else:
-        found.append("Nothing was held out: give --validate recordings to learn how well it predicts.")
+        found.append(
+            "There are no held-out recordings: give --validate recordings to measure how well the model predicts."
+        )
     open_, in_sums = undetermined(identification), determined_in_sums(identification)
     if in_sums:
         found.append(
-            f"{listed(in_sums, MAX_NAMED)} {'is' if len(in_sums) == 1 else 'are'} less sure than all bodies of the description together "
-            "are large: the torque determines sums with others, and none of them alone."
+            f"{listed(in_sums, MAX_NAMED)} {'is' if len(in_sums) == 1 else 'are'} not determined alone, only in sums "
+            f"with others: the standard deviation is larger than the sum of all bodies in the robot description."
         )
     if open_:
         found.append(
-            f"The data leave {listed(open_, MAX_NAMED)} undetermined; a motion that excites {'it' if len(open_) == 1 else 'them'} "
-            "is needed."
+            f"The data do not determine {listed(open_, MAX_NAMED)}; record a motion that excites "
+            f"{'it' if len(open_) == 1 else 'them'}."
         )
     elif not in_sums:
         found.append("Every parameter is determined.")
     possible = identification.physical_consistency
     if possible.possible:
-        found.append("An arm with these parameters can exist.")
+        found.append("The parameters are physically consistent.")
     elif possible.possible is None:
         why = "; ".join(possible.reasons)
         found.append(f"{why[0].upper()}{why[1:]}.")
     else:
         found.append(
-            f"No real arm has these parameters: {'; '.join(possible.reasons)}. Use --method consistent for one that can exist."
+            f"The parameters are not physically consistent: {'; '.join(possible.reasons)}. Use --method consistent for parameters that are."
         )
         below = below_zero_said(identification.estimate, identification.training)
         if below is not None:
@@ -181,16 +183,18 @@ def _others(identification: Identification) -> list[str]:
     unsure = of_unknown_std(identification)
     if unsure:
         found.append(
-            f"How sure {listed(unsure, MAX_NAMED)} {'is' if len(unsure) == 1 else 'are'}, is not known: one stretch of time tells "
-            f"{'it' if len(unsure) == 1 else 'them'} all but alone, and nothing says how far another would differ; record longer."
+            f"The standard deviation of {listed(unsure, MAX_NAMED)} is not known: almost all information about "
+            f"{'it' if len(unsure) == 1 else 'them'} comes from one stretch of time; record longer."
         )
     found.append(weights_said(identification.estimate))
     if identification.estimate.variation:
         found += [f"{said}." for said in identification.estimate.variation.sentences(robot)]
     runs = len(identification.training.data.recordings)
     if runs < MIN_RUNS:
-        few = "How runs differ" if runs == 1 else "How runs differ but for offsets"
-        found.append(f"{few} is not known from {NUMBERS[runs]}, and is in no standard deviation: record three or more.")
+        few = "How runs differ" if runs == 1 else "How runs differ, except for offsets,"
+        found.append(
+            f"{few} is not known from {NUMBERS[runs]} and is not in the standard deviations: record three or more."
+        )
     biased = bias_said(identification.estimate)
     if biased is not None:
         found.append(biased)
@@ -224,15 +228,16 @@ def below_zero_said(estimate: Estimate, observations: Observations) -> str | Non
         max_first = sorted(beyond, key=lambda name: -beyond[name])
         said = listed([f"{name} by {beyond[name]:.2g} standard deviations" for name in max_first], MAX_NAMED)
         return (
-            f"Below zero by more than chance: {said}. Something that the model lacks or the description has wrong is in them, and may be in "
-            "any parameter; standard deviations hold none of it, and a possible arm hides it: diagnose the recordings."
+            f"Negative by more than chance: {said}. Something that the model lacks, or an error of the robot "
+            f"description, biases them and perhaps other parameters; the standard deviations do not include this bias, "
+            f"and the method consistent hides it: diagnose the recordings."
         )
     if not size:
         return None
     most = max(size, key=lambda k: size[k])
     return (
-        f"Negative, as no arm's can be: {columns[most].name} by {size[most]:.2g} standard deviations; chance may make up to "
-        f"{BEYOND_CHANCE:g} of one among so many."
+        f"Negative, which is impossible for a real arm: {columns[most].name} by {size[most]:.2g} standard deviations; "
+        f"with so many parameters up to {BEYOND_CHANCE:g} may be chance."
     )
 
 

@@ -33,8 +33,8 @@ def left_out_words(content: Mapping[str, Any]) -> str:
     if not shares:
         return ""
     return (
-        f"Errors are of the time in which a joint moves: {' to '.join(shares)} % of the time is left out at its rests and "
-        "turns and at the ends of recordings."
+        f"Errors are for the time in which a joint moves: {' to '.join(shares)} % of the time, at rest, at reversals "
+        f"and at the ends of recordings, is left out."
     )
 
 

@@ -96,7 +96,7 @@ def effect_figures(context: DiagnosisContext) -> list[tuple[str, str, list[Seque
             found.append((effect.title, f"effect_{chapter.number}.png", rows))
         group = None if remainder is None else remainder_group(robot, remainder, context.sets["training"])
         if remainder is not None and group is not None:
-            title = f"What no effect accounts for on {remainder.joint}"
+            title = f"What no effect explains on {remainder.joint}"
             found.append((title, "unexplained.png", [group.figures]))
     return found
 

@@ -12,7 +12,7 @@ from scara_ident.effects.spectra import around
 from scara_ident.report.traces import Trace
 from scara_ident.robot.robot import Robot
 
-ORDER_WORDS = "Within the band: a ripple that passes faster than the band is not in it."
+ORDER_WORDS = "Within the band only: a ripple whose frequency is above the band is not shown."
 SEGMENT_SECONDS = 4.0
 LOG_BINS = 260
 # Samples per motor turn onto which residuals are gathered, and the highest order shown.

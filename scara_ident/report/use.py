@@ -88,15 +88,15 @@ def worth_dict(model: IdentifiedModel) -> dict[str, Any]:
 def _cost_said(item: EffectWorth, rms: Mapping[str, Array]) -> str:
     alone = rms["pid"]
     where = f" of {item.entry['joint']}" if item.entry["joint"] else ""
-    said = f"{item.entry['effect']}{where}: without it the PID alone would leave {total(item.alone, alone):.0%} of its error"
+    said = f"{item.entry['effect']}{where}: if the arm did not have it, the error of the PID alone would be {total(item.alone, alone):.0%} of its present value"
     if item.not_fed is None:
         return f"{said}."
     fed, without = total(rms["effects"], alone), total(item.not_fed, alone)
     if f"{fed:.0%}" == f"{without:.0%}":
         # Two equal numbers would read as if it did nothing.
         return f"{said}."
-    harm = ": it does harm, so leave it out of what is fed forward" if _harms(fed, without) else ""
-    return f"{said}; with all effects fed forward {fed:.0%} is left, with all but this one {without:.0%}{harm}."
+    harm = ": it does harm, so leave it out of the feed-forward" if _harms(fed, without) else ""
+    return f"{said}; with all effects in the feed-forward the error is {fed:.0%} of that value, with all but this one {without:.0%}{harm}."
 
 
 def _harms(fed: float, without: float) -> bool:
@@ -111,12 +111,10 @@ def total(errors: Array, alone: Array) -> float:
 
 def _shares_said(rms: Mapping[str, Array]) -> str:
     shares = {name: total(value, rms["pid"]) for name, value in rms.items() if name != "pid"}
-    last = (
-        f", {WORDS['effects']} {shares['effects']:.0%}." if "effects" in shares else "; no effects were found to add."
-    )
+    last = f" and {shares['effects']:.0%} {WORDS['effects']}." if "effects" in shares else "; no effects were found."
     return (
-        f"Of the PID's tracking error {shares['urdf']:.0%} are left {WORDS['urdf']}, {WORDS['identified']} "
-        f"{shares['identified']:.0%}{last}"
+        f"The tracking error, relative to the PID alone, is {shares['urdf']:.0%} {WORDS['urdf']}, "
+        f"{shares['identified']:.0%} {WORDS['identified']}{last}"
     )
 
 
@@ -129,13 +127,13 @@ def _harm_said(joints: Sequence[str], rms: Mapping[str, Array]) -> list[str]:
         for joint, alone, without, fed in zip(joints, rms["pid"], rms["identified"], rms["effects"], strict=True)
         if alone > 0.0 and _harms(fed / alone, without / alone)
     ]
-    return [f"Fed forward the effects do harm on {', '.join(worse)}: leave them out there."] if worse else []
+    return [f"In the feed-forward the effects do harm on {', '.join(worse)}: leave them out there."] if worse else []
 
 
 def sentences(result: Use) -> list[str]:
     """Say in words what was won."""
     said = [_shares_said(result.rms()), *_harm_said(result.model.robot.joints, result.rms())]
-    said += [f"{doubt[0].upper()}{doubt[1:]}; it is in what is fed forward." for doubt in result.model.doubts]
+    said += [f"{doubt[0].upper()}{doubt[1:]}; it is in the feed-forward." for doubt in result.model.doubts]
     for name, rows in result.rollouts.items():
         words = WORDS[name]
         if name == "effects" and result.missing:
@@ -143,18 +141,18 @@ def sentences(result: Use) -> list[str]:
         place = int(np.argmin(np.abs(np.array(result.horizons) - 0.2)))
         if not np.all(np.isfinite(rows[place])):
             if np.any(np.isinf(rows)):
-                said.append(f"Simulated {words} the arm gets lost.")
+                said.append(f"Simulated {words} the arm diverges.")
             else:
                 said.append(
-                    f"Simulated {words} the arm goes on from no moment of the recording: in none do all joints move, with "
-                    f"{max(result.horizons):g} s to come; give one in which they move at once."
+                    f"Simulated {words}: the recording has no moment at which all joints move and "
+                    f"{max(result.horizons):g} s follow; give a recording in which all joints move at the same time."
                 )
             continue
         ends = ", ".join(
             f"{joint} {value:.2g} {result.model.robot.position_unit(j)}"
             for j, (joint, value) in enumerate(zip(result.model.robot.joints, rows[place], strict=True))
         )
-        said.append(f"Simulated {words} the arm is off after {result.horizons[place]:g} s by {ends}.")
+        said.append(f"Simulated {words}, the position error after {result.horizons[place]:g} s is {ends}.")
     if result.not_mujoco:
         said.append(f"Not simulated in MuJoCo: {result.not_mujoco}.")
     if result.missing:

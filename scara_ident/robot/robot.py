@@ -41,8 +41,8 @@ class Robot(Frozen):
     urdf : Path
         File the model came from.
     model : pinocchio.Model
-        Model of the identified joints alone; every other movable joint is locked. Every joint has one degree
-        of freedom, so ``model.nv == n``.
+        Model of the identified joints only; every other movable joint is locked. Every joint has one degree of freedom,
+        so ``model.nv == n``.
     joints : tuple of str
         The n joints in the order of the robot description.
     links : tuple of str
@@ -52,11 +52,11 @@ class Robot(Frozen):
     prismatic : ndarray of bool, shape (n,)
         Which joints translate.
     reduction : ndarray, shape (n,)
-        Motor turns per joint turn; negative where the gear reverses, never 0.
+        Motor turns per joint turn; negative if the gear reverses, never 0.
     rotor_inertia : ndarray, shape (n,)
-        Nominal inertia of the rotor on the motor side, kg m^2; 0 where nothing is stated, see `rotor_stated`.
+        Nominal inertia of the rotor on the motor side, kg m^2; 0 if not stated, see `rotor_stated`.
     rotor_stated : ndarray of bool, shape (n,)
-        Where description or URDF state it.
+        Whether the description or the URDF states it.
     effort_side : {"motor", "joint"}
         Side of the gear on which effort is measured and the equations are written.
     effort_gain : ndarray, shape (n,)
@@ -70,9 +70,9 @@ class Robot(Frozen):
     locked : tuple of (str, float)
         Locked joints and their positions.
     channels : Channels or None
-        Columns and units of the recordings; None for the contract's.
+        Columns and units of the recordings; None for the default ones.
     notes : tuple of str
-        What was decided of joints that the description does not name.
+        Decisions about joints that the description does not name.
     """
 
     name: str
@@ -128,12 +128,12 @@ class Robot(Frozen):
         return self.effort_limit * np.abs(self.row_scale)
 
     def joint_index(self, name: str) -> int:
-        """Return the place of a joint among `joints`.
+        """Return the index of a joint in `joints`.
 
         Raises
         ------
         UsageError
-            If there is no such joint; the line lists those there are.
+            If there is no such joint; the message lists the joints.
         """
         if name not in self.joints:
             raise UsageError(f"{self.name} has no joint {name!r}; its joints are {', '.join(self.joints)}")
@@ -176,8 +176,8 @@ def load_robot(path: Path | str | None = None) -> Robot:
     Parameters
     ----------
     path : path, optional
-        A ``robot.yaml``, or a URDF whose movable joints are all to be identified with effort at the joints, or the
-        name of such a robot of example-robot-data, as ``"ur5"``. Without it the embedded SCARA03 is loaded.
+        A ``robot.yaml``; or a URDF, of which all movable joints are identified, with effort at the joints; or the name
+        of such a robot of example-robot-data, such as ``"ur5"``. Default: the embedded SCARA03.
 
     Returns
     -------
@@ -186,7 +186,7 @@ def load_robot(path: Path | str | None = None) -> Robot:
     Raises
     ------
     RobotError
-        In one line: file, key and what was expected.
+        If the description cannot be used; one line names the file, the key and what was expected.
 
     Examples
     --------

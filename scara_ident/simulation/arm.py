@@ -62,7 +62,7 @@ class Controller:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class VirtualArm(Frozen):
-    """An arm with known parameters, to rehearse on.
+    """A simulated arm with known parameters.
 
     Rows are in the robot's order of joints. Torques are on the robot's effort side; friction is a polynomial of the
     joint's speed in the motor's direction (equation 3 of Indri et al. 2002).
@@ -85,7 +85,7 @@ class VirtualArm(Frozen):
         Standard deviation of the recorded torque, N m, white.
     controller : Controller
     torque_scale : ndarray, shape (n,)
-        A usual torque of each joint, N m, from which effects take their default sizes.
+        A typical torque of each joint, N m, which sets the default sizes of effects.
     tool : ndarray, shape (3,)
         The tool point in the frame of the last joint (Pinocchio's frame of the last joint in Pinocchio's order), m.
     """
@@ -139,9 +139,9 @@ class VirtualArm(Frozen):
 
     @property
     def radian(self) -> Array:
-        """What goes with a radian of a joint that turns, shape (n,): 1, and of one that slides its stroke over pi, m.
+        """The motion that corresponds to one radian, shape (n,).
 
-        Lengths that effects have by default are multiples of it. A slide without limits has a stroke of a metre.
+        1 for a revolute joint, the stroke divided by pi, m, for a prismatic one. Default lengths of effects are multiples of it. A prismatic joint without limits has a stroke of a metre.
         """
         stroke = self.robot.upper - self.robot.lower
         return np.where(self.robot.prismatic, np.where(np.isfinite(stroke), stroke, 1.0) / np.pi, 1.0)

@@ -27,7 +27,7 @@ USUAL_ACCELERATION = 3.0
 
 
 def virtual_arm(robot: Robot | None = None) -> VirtualArm:
-    """Return the virtual arm of a robot with sensible values for what its URDF does not say.
+    """Return the virtual arm of a robot, with typical values for everything that its URDF does not contain.
 
     Parameters
     ----------
@@ -38,8 +38,8 @@ def virtual_arm(robot: Robot | None = None) -> VirtualArm:
     Returns
     -------
     VirtualArm
-        For another robot: the bodies of the URDF; rotor inertias where unknown a share of the links' inertia;
-        friction and noise shares of a usual torque; PID gains by placing three poles on the mean inertia.
+        For another robot: the bodies of the URDF; unknown rotor inertias are a share of the links' inertia; friction
+        and noise are shares of a typical torque; PID gains place three poles for the mean inertia.
     """
     robot = load_robot() if robot is None else robot
     mass, gravity = _usual(robot)

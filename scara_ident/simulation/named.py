@@ -14,7 +14,7 @@ _RECONSTRUCTIONS = ("CI", "L1", "L2")
 
 
 def named_motion(word: str, robot: Robot) -> ReferenceMotion:
-    """Return a motion: a trajectory.csv, or one of the paper's by name on the SCARA03.
+    """Return a motion: that of a trajectory.csv, or on the SCARA03 one of the paper's by its name.
 
     Raises
     ------

@@ -30,7 +30,7 @@ WHITE = TorqueNoise()
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SimulationResult(Reported, reported_by="simulation"):
-    """A recording and what was behind it.
+    """A recording, with the arm, effects and motion that produced it.
 
     Attributes
     ----------
@@ -38,7 +38,7 @@ class SimulationResult(Reported, reported_by="simulation"):
     effects : tuple of Effect
         With all their sizes.
     motion : ReferenceMotion
-        What the arm was asked to follow, at the recording's times.
+        The reference motion, at the times of the recording.
     recording : Recording
     true : TrueMotion
     seed, repetition : int
@@ -47,7 +47,7 @@ class SimulationResult(Reported, reported_by="simulation"):
     substeps : int
         Integration steps per period of the controller.
     stops : int
-        How often a joint came to a stop between the steps.
+        Number of stops of a joint between the steps.
     """
 
     arm: VirtualArm
@@ -82,39 +82,39 @@ def simulate(
 ) -> SimulationResult:
     """Let the virtual arm follow a motion in closed loop.
 
-    The arm starts on the reference, at its speed, with the integral at the torque that this takes. Every sample the
-    encoder is read, the PID computes a torque and the drive holds it until the next sample. The recorded effort is
+    The arm starts on the reference, with its speed, and with the integral part at the torque that this needs. At every
+    sample the encoder is read, the PID computes a torque, and the drive holds it until the next sample. The recorded effort is
     the mean over one period of the controller centred on the sample, so that it does not lag position, plus noise.
 
     Parameters
     ----------
     arm : VirtualArm
     motion : ReferenceMotion
-        Interpolated where its samples are not those of the controller.
+        It is interpolated if its samples are not those of the controller.
     effects : sequence of Effect
-        Sizes that were left open are taken from the arm. Those of another recording are left out.
+        Sizes that are not given are taken from the arm. Effects of another recording are left out.
     seed : int
-        Of noise and encoder zero; the same seed and repetition give the same recording.
+        Seed of noise and encoder zero; the same seed and repetition give the same recording.
     repetition : int
-        Number of the run; every one has its own noise.
+        Number of the run; every run has its own noise.
     rate : float
         Samples per second of the recording.
     ticks : int
         Periods of the controller per sample: it runs at ``ticks`` times the rate, and one of them is recorded.
     averaged : bool
-        Whether the recorded effort is the mean over a whole sample instead, so that nothing of it is lost or aliased.
+        Whether the recorded effort is instead the mean over a whole sample, which avoids aliasing.
     substeps : int, optional
-        Integration steps per period of the controller; by default `min_substeps`, more where an elastic joint needs them.
+        Integration steps per period of the controller; default: `min_substeps`, or more if an elastic joint needs them.
     min_substeps : int, optional
-        Where nothing needs more; two are enough for tracking errors, in half the time.
+        Smallest number of integration steps; two are enough for tracking errors, in half the time.
     record_velocity : bool
         Whether the recording has the velocity that the controller saw.
     link_encoders : sequence of str
-        Joints with a second encoder behind the gear, of the same resolution at the joint and with a zero of its own.
+        Joints with a second encoder behind the gear, with the same resolution at the joint and its own zero.
     noise : TorqueNoise
-        Its distribution; its standard deviation is the arm's.
+        Distribution of the noise; its standard deviation is the arm's.
     run : RunState, optional
-        In what this run differs from the arm; by default in nothing.
+        Differences of this run from the arm; default: none.
     feed : ndarray, shape (n, ticks), optional
         Torque on the effort side, added to the PID's at every tick of the controller; its integral then starts at 0.
 
@@ -125,10 +125,10 @@ def simulate(
     Raises
     ------
     UsageError
-        If the motion is not of this arm's joints, an effect does not fit, ``ticks`` is under 1, or ``feed`` is too short or
+        If the motion is for other joints, an effect does not fit, ``ticks`` is under 1, or ``feed`` is too short or
         too long.
     LostArm
-        If the controller loses the arm.
+        If the controller loses control of the arm.
 
     Examples
     --------

@@ -92,7 +92,7 @@ def calibrate(runs: Sequence[Observed], rate: float) -> Alarm:
     most = tail.clusters / tail.hours / CLUSTERS_OVER_RATE
     if rate > most:
         raise RecordingError(
-            f"{runs[0].name}: {rate:g} false alarms an hour are more than peaks of the residual tell; ask for {most:.3g} or fewer"
+            f"{runs[0].name}: {rate:g} false alarms per hour are more than the peaks of the residual support; give {most:.3g} or fewer"
         )
     level, spread = stated_level(tail, times, scores, seconds, rate)
     factor = level * common

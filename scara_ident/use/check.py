@@ -276,14 +276,14 @@ def sentences(found: Check) -> list[str]:
     said, energy = [], found.energy
     worst = found.limited_by
     if worst is None:
-        said.append("No limit is known, so nothing can be said against it.")
+        said.append("No limit is known, so none is exceeded.")
     else:
         near = f"{_named(worst)} at {worst.time:.3f} s: {worst.reached:.4g} of {worst.bound:.4g} {worst.unit}"
         said.append(f"It cannot be run: {near}." if found.broken else f"It can be run. Nearest to its limit is {near}.")
     if found.broken:
         share = found.speed_share
         said.append(
-            f"Nor can it at {MIN_SPEED_SHARE:g} of the speed, where {_still_beyond(found)}."
+            f"Even at {MIN_SPEED_SHARE:g} of the speed it cannot be run: {_still_beyond(found)}."
             if share is None
             else f"Along the same path it can be run at {share:.3g} of the speed."
         )
@@ -292,9 +292,7 @@ def sentences(found: Check) -> list[str]:
             said.append(f"Also beyond their limits: {listed(others, MAX_NAMED)}.")
     close = _close(found)
     if close:
-        said.append(
-            f"Within two standard deviations of the foreseen torque of the limit: {', '.join(each.name for each in close)}."
-        )
+        said.append(f"Within two standard deviations of their torque limit: {', '.join(each.name for each in close)}.")
     unsure = [
         f"{each.joint} ({each.torque:.3g} ± {CLOSE_STDS * each.std:.2g} {each.unit})"
         for each in found.peaks
@@ -302,7 +300,7 @@ def sentences(found: Check) -> list[str]:
     ]
     if unsure:
         said.append(
-            f"By two standard deviations the largest torque is known to no better than a tenth on {listed(unsure, MAX_NAMED)}."
+            f"The largest torque is uncertain by more than a tenth (two standard deviations) on {listed(unsure, MAX_NAMED)}."
         )
     said.append(
         f"The drives give {energy.given.sum():.4g} J and take {energy.returned.sum():.4g} J back; "

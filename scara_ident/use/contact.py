@@ -213,18 +213,18 @@ def sentences(found: ContactFindings) -> list[str]:
     alarm, count = found.observer.alarm, len(found.contacts)
     said = [
         f"{'No contact' if count == 0 else '1 contact' if count == 1 else f'{count} contacts'} in {3600.0 * found.hours:.4g} s "
-        f"of motion; {alarm.rate * found.hours:.2g} false alarms are to be expected, at {alarm.rate:g} an hour."
+        f"of motion; {alarm.rate * found.hours:.2g} false alarms are expected, at {alarm.rate:g} per hour."
     ]
     said.append(
-        f"Thresholds rest on {3600.0 * alarm.hours:.4g} s without contact, {alarm.clusters} peaks of the residual."
+        f"The thresholds come from {3600.0 * alarm.hours:.4g} s without contact, with {alarm.clusters} peaks of the residual."
     )
     if alarm.rate * alarm.hours < 1.0:
         said.append(
-            f"That is less than the {1.0 / alarm.rate:.3g} h in which one false alarm is stated: the rate is extrapolated, "
-            "and the more uncertain; record more motion without contact."
+            f"That is less than the {1.0 / alarm.rate:.3g} h in which one false alarm is expected: the rate is "
+            f"extrapolated and therefore less certain; record more motion without contact."
         )
     if found.observer.external.left_out:
         said.append(
-            f"Left out, as they take more than position and velocity: {', '.join(found.observer.external.left_out)}."
+            f"Left out, because they need more than position and velocity: {', '.join(found.observer.external.left_out)}."
         )
     return said

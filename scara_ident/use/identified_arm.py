@@ -43,7 +43,7 @@ def arms_of(model: IdentifiedModel) -> tuple[VirtualArm, VirtualArm]:
         See `arm_with`.
     """
     if model.model.name not in _MODELS:
-        raise UsageError(f"its model {model.model.name!r} is none that the virtual arm has")
+        raise UsageError(f"the virtual arm does not have its model {model.model.name!r}")
     near = model.standard
     bare, whole = (arm_with(model.robot, by_name(model, value), near) for value in (model.before, model.value))
     return bare, whole
@@ -105,8 +105,9 @@ def rotor_note(model: IdentifiedModel) -> str:
     if not said:
         return ""
     return (
-        f"The fit has a rotor of less than no inertia, at the joint: {listed(said, 6)}. No arm has one: it is 0 in the virtual "
-        "arm and in what is fed forward; identify with --method consistent, or from motion that tells more."
+        f"The fit has a negative rotor inertia, at the joint: {listed(said, 6)}. No arm has one: it is set to 0 in the "
+        f"virtual arm and in the feed-forward; identify with --method consistent, or from a motion with better "
+        f"excitation."
     )
 
 
@@ -194,10 +195,10 @@ def light_joint(arm: VirtualArm) -> str:
         total += np.diag(mass)[robot.order] / _POSES
         least = np.minimum(least, 1.0 / np.diag(np.linalg.inv(mass))[robot.order])
     j = int(np.argmin(least / total))
-    rotor = ", next to nothing of it its rotor's" if arm.armature[j] < 0.01 * least[j] else ""
+    rotor = ", of which the rotor has almost nothing" if arm.armature[j] < 0.01 * least[j] else ""
     return (
-        f"{robot.joints[j]} has an inertia of {total[j]:.2g} {robot.armature_unit(j)} in the mean{rotor}, and where the other joints "
-        f"give way down to {least[j]:.2g}"
+        f"{robot.joints[j]} has a mean inertia of {total[j]:.2g} {robot.armature_unit(j)}{rotor}, and down to "
+        f"{least[j]:.2g} when the other joints move freely"
     )
 
 
@@ -213,8 +214,8 @@ def _mean_inertia(arm: VirtualArm) -> Array:
     for mass in _masses(arm):
         if np.linalg.eigvalsh(mass)[0] <= 0.0:
             raise RobotError(
-                f"{robot.name}: no arm with these parameters can move, its inertia is not positive; identify with "
-                "--method consistent, or from motion that tells more"
+                f"{robot.name}: no arm with these parameters can move, because its inertia is not positive; identify "
+                f"with --method consistent, or from a motion with better excitation"
             )
         total += np.diag(mass)[robot.order] / _POSES
     return total

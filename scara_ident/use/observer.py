@@ -120,7 +120,7 @@ class ContactObserver:
             If an array has another shape, velocities are missing, or the step is not above 0.
         """
         if self.velocity and v is None:
-            raise UsageError("v is None; thresholds were taken with recorded velocities: give them to update")
+            raise UsageError("v is None, but the thresholds come from recorded velocities; give velocities to update")
         if not 0.0 < step < np.inf:
             raise UsageError(f"step is {step:g} s; expected the time since the sample before, above 0")
         q, effort = self._one("q", q), self._one("effort", effort)
@@ -175,7 +175,7 @@ def contact_observer(
         If there are no such recordings, or they are too short or lack efforts.
     """
     if not free:
-        raise ScaraIdentError("no recordings without contact to take thresholds from; give some")
+        raise ScaraIdentError("no recordings without contact, which the thresholds need; give some")
     if not (rate > 0.0 and bandwidth > 0.0):
         raise ScaraIdentError(f"rate {rate:g} and bandwidth {bandwidth:g}: give numbers above 0")
     velocity = all(item.velocity is not None for item in free)
@@ -207,7 +207,7 @@ def _observed(external: ExternalTorque, item: Recording, *, velocity: bool) -> O
         raise RecordingError(f"{item.path or item.name}: no effort was recorded; contact cannot be detected without")
     if velocity and item.velocity is None:
         raise RecordingError(
-            f"{item.path or item.name}: no velocity was recorded, as it was without contact; record it here too"
+            f"{item.path or item.name}: no velocity was recorded, but the recordings without contact have it; record it here too"
         )
     v = item.velocity if velocity else None
     return observe_recording(external, item.name, item.time, item.position, v, item.effort)

@@ -173,6 +173,7 @@ def _followed(
         except LostArm:
             continue
     raise LostArm(
-        f"{motion.name}: no controller holds {arm.robot.name} with these parameters: {light_joint(arm)}; record motion that tells "
-        "its inertia (`scara-ident excite`), or see by `scara-ident diagnose` what the model lacks"
+        f"{motion.name}: no controller stabilises {arm.robot.name} with these parameters: {light_joint(arm)}; record a "
+        f"motion that excites its inertia (`scara-ident excite`), or find with `scara-ident diagnose` what the model "
+        f"lacks"
     )

@@ -124,8 +124,8 @@ def use(
     if any(rows) and not all(rows):
         still = listed([joint for joint, count in zip(model.robot.joints, rows, strict=True) if not count], 3)
         raise ScaraIdentError(
-            f"{model.robot.name}: {still} did not move in the recordings that the model was found on, and no arm can be "
-            "simulated by it; identify it with recordings in which all joints move"
+            f"{model.robot.name}: {still} did not move in the recordings of the identification, so no arm can be "
+            f"simulated with this model; identify it from recordings in which all joints move"
         )
     random = np.random.default_rng(seed)
     pairs, missing = simulated(model.found)
@@ -176,7 +176,7 @@ def use(
         progress("rolling out", 0.7)
         parts = [part for part in prepare(recordings, model.bands).stretches if part.usable]
         if not parts or any(part.stretch.torque is None for part in parts):
-            raise RecordingError(f"{recordings[0].name}: too short, or without effort, to roll out with; record longer")
+            raise RecordingError(f"{recordings[0].name}: too short, or without effort, for a simulation; record longer")
         rollouts["identified"] = _over(parts, virtual_free(bare, ()))
         if effects:
             rollouts["effects"] = _over(parts, virtual_free(whole, effects))

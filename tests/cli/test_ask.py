@@ -19,8 +19,8 @@ def test_an_empty_folder_asks_for_a_first_motion(command, steps, tmp_path: Path)
     result = command("ask", tmp_path / "arm", *QUICK, "--tool-speed", "0.5")
     assert "run_1.csv lies beside recordings/ and is not read" in result.out
     assert steps[0] == "designing: search 1" and steps[-1].endswith(" done")
-    assert result.status == 0 and "Nothing is recorded yet" in result.out
-    assert "Collisions were not looked for" in result.out + result.err
+    assert result.status == 0 and "There are no recordings yet" in result.out
+    assert "Collisions were not checked" in result.out + result.err
     assert (tmp_path / "arm" / "next" / "trajectory.csv").is_file()
     limit = json.loads((tmp_path / "arm" / "next" / "excitation.json").read_text())["limits"]["tool.speed"]
     assert limit["bound"] == 0.5 and limit["share"] <= 1.0
@@ -38,7 +38,7 @@ def test_what_was_found_is_said_before_what_to_record(command, tmp_path: Path, m
     content = {"verdict": "explained", "model": "basic", "next": [], "effects": found}
     (tmp_path / "diagnosis.json").write_text(json.dumps(content))
     said = " ".join(command("ask", tmp_path).out.split())
-    assert said.startswith("So far: explained, found spring on joint1; all of it in ") and said.endswith(
+    assert said.startswith("So far: explained, found spring on joint1; the full report is ") and said.endswith(
         "Nothing is open."
     )
 
@@ -46,7 +46,7 @@ def test_what_was_found_is_said_before_what_to_record(command, tmp_path: Path, m
 def test_a_folder_that_is_not_there_is_not_made(command, tmp_path: Path):
     for more in ((), ("--virtual",)):
         result = command("ask", tmp_path / "arn", *QUICK, *more)
-        assert result.status == 2 and "arn: no such folder; make it" in result.err
+        assert result.status == 2 and "arn: no such folder; create it" in result.err
     assert list(tmp_path.iterdir()) == []
 
 

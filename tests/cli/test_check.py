@@ -17,7 +17,7 @@ def test_a_motion_that_can_be_run(command, steps, folder: Path, result_file: Pat
     assert done.status == 0
     assert "It can be run." in done.out
     assert steps == [
-        "reading the model", "reading the motion", "looking at every limit", "writing", "drawing check.png",
+        "reading the model", "reading the motion", "checking every limit", "writing", "drawing check.png",
         "drawing report.html",
     ]  # fmt: skip
     content = json.loads((tmp_path / "check.json").read_text())

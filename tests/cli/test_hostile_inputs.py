@@ -85,7 +85,7 @@ def test_the_demo_follows_no_link_out_of_its_folder(command, here: Path):
     (here / "out" / "identify").symlink_to(here / "theirs")
     answer = command("demo", "--output", "out")
     assert answer.status == 1
-    assert "out/identify: a link, and results stay in out; take it away" in answer.err
+    assert "out/identify: is a link, but results must stay in out; remove it" in answer.err
     assert files(here) == set()
 
 
@@ -190,7 +190,7 @@ def test_rings_of_links_and_names_that_are_no_text_are_refused(command, here: Pa
             assert command(*words).status == 2
 
 
-def test_a_field_longer_than_the_parser_takes_is_read_or_told(command, here: Path):
+def test_a_field_longer_than_the_parser_takes_is_read_or_reported(command, here: Path):
     save(here / "good.csv", columns(1200))
     header, *rows = (here / "good.csv").read_text().splitlines()
     long = "y" * 200_000

@@ -54,7 +54,7 @@ def test_it_says_parameters_errors_and_the_result_in_words(command, folder: Path
         "OJD_1",
         "held out",
         "J_d",
-        "It generalises worst to CI_1",
+        "The largest held-out error is on CI_1",
     ):
         assert text in result.out
     assert max(len(line) for line in result.out.splitlines()) <= 80

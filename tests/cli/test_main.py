@@ -139,7 +139,7 @@ def test_a_user_gets_one_line_when_it_cannot_be(tmp_path: Path):
         ("scara-ident identify --method ", {"ols", "wls", "rls", "consistent"}),
     ],
 )
-def test_the_shell_is_told_how_words_go_on(words: str, offered: set[str]):
+def test_the_shell_gets_the_completions(words: str, offered: set[str]):
     asked = {"_SCARA_IDENT_COMPLETE": "complete_bash", "COMP_WORDS": words, "COMP_CWORD": str(words.count(" "))}
     done = user(environment=asked)
     assert (done.returncode, done.stderr) == (0, "")

@@ -22,7 +22,7 @@ def pushed():
     return with_torque(exact_runs(), 0, lambda motion: -4.0 * motion.v[0])
 
 
-def test_friction_that_pushes_is_told_on_its_joint_alone():
+def test_friction_that_pushes_is_reported_on_its_joint_alone():
     training = observed(pushed())
     first, second = braking_evidence(SHOWN, wls(training), training, ())
     assert (first.shown, first.lacks) == (False, True)
@@ -46,5 +46,7 @@ def test_a_model_whose_friction_pushes_is_not_complete():
     """Of a measured arm friction of 18 N m against the motion was said to be nothing: `record more`. Beside noise it was `complete`."""
     found = diagnose(load_robot(), pushed(), bands=BANDS, catalogue=())
     assert found.verdict == "undecided"
-    assert sentences(found)[0] == "Undecided: something is missing, on joint1, that these recordings cannot name."
+    assert (
+        sentences(found)[0] == "Undecided: something is missing on joint1, but these recordings cannot show what it is."
+    )
     assert any("its friction pushes with" in said for said in sentences(found))

@@ -102,7 +102,7 @@ def test_recordings_held_out_take_no_part(spring):
     assert result.search.bands == spring.search.bands
     # They choose nothing, but where the model does not hold on them nothing is shown to be noise.
     assert (spring.verdict, result.verdict) == ("explained", "undecided")
-    assert any("recordings held out is" in item.why for item in result.evidence)
+    assert any("held-out recordings is" in item.why for item in result.evidence)
     assert rms_of(result.after.value, result.validation_after) != rms_of(spring.after.value, spring.validation_after)
 
 
@@ -179,14 +179,14 @@ def test_a_longer_delay_is_an_effect_and_is_corrected_in_what_is_held_out():
     assert rms_of(result.after.value, result.validation_after)[0] < 0.8 * old[0]
 
 
-def test_a_model_can_be_given_and_progress_is_told():
+def test_a_model_can_be_given_and_progress_is_reported():
     told: list[tuple[str, float]] = []
     result = diagnose(
         ROBOT, exact_runs(), model=complete(), bands=BANDS, catalogue=(), progress=lambda *step: told.append(step)
     )
     assert result.before.model.name == "complete"
     assert [step for step, _ in told[-2:]] == [
-        "testing what is left", "comparing what was found with what else it could be",
+        "testing what is left", "comparing the effects found with their alternatives",
     ]  # fmt: skip
     shares = [done for _, done in told]
     assert shares == sorted(shares)
@@ -219,7 +219,7 @@ def test_without_a_reduction_ripple_of_the_motor_is_not_looked_for_and_that_is_s
         assert all(note.endswith("over its pole pitch)") is slides for note in notes)
 
 
-def test_what_is_told_from_a_lower_band_is_of_one_model_and_what_is_left_is_judged_where_it_was_found(monkeypatch):
+def test_what_a_lower_band_determines_is_of_one_model_and_what_is_left_is_judged_where_it_was_found(monkeypatch):
     """Above a band of 4.8 Hz a line of the elastic gears, which stood in none of 23 Hz, made an explained arm undecided."""
     module, seen = sys.modules[diagnose.__module__], []
 
@@ -249,6 +249,6 @@ def test_what_is_told_from_a_lower_band_is_of_one_model_and_what_is_left_is_judg
     assert (found.value, found.std) == (result.after.value[len(place)], result.after.std[len(place)])
     assert min(outcome.search.bands) > 8.0
     assert outcome.training.data.bands == outcome.residuals.data.bands == there.after.data.bands == outcome.search.bands
-    assert any(note.startswith("all is estimated below 8 Hz") for note in result.notes)
+    assert any(note.startswith("all parameters are estimated below 8 Hz") for note in result.notes)
     # Bands that were asked for are kept.
     assert diagnose(ROBOT, runs, bands=BANDS, catalogue=(Spring(),)).search.bands == BANDS

@@ -59,7 +59,7 @@ class Reciprocal(Spring):
 
 
 @pytest.mark.slow
-def test_an_effect_says_as_what_its_parameters_are_told() -> None:
+def test_an_effect_says_as_what_its_parameters_are_determined() -> None:
     (found,) = diagnose(load_robot(), virtual_runs("spring:joint1"), bands=BANDS, catalogue=(Reciprocal(),)).effects
     assert found.parameters["stiffness"].symmetric_power == -1.0
 
@@ -82,7 +82,7 @@ def test_an_effect_says_what_else_it_may_be_together_with_another() -> None:
 def test_what_a_second_encoder_tells_of_an_effect_that_was_not_added_is_said() -> None:
     readings = {("joint_elasticity", "joint1"): {"stiffness": Parameter(20012.0, 211.0, "N m/rad")}}
     assert not_found(readings, []) == [
-        "joint_elasticity of joint1 was not added, but a channel of its own tells stiffness 2.001e+04 +- 2e+02 N m/rad"
+        "joint_elasticity of joint1 was not added, but a separate channel gives stiffness 2.001e+04 +- 2e+02 N m/rad"
     ]
 
 
@@ -126,7 +126,7 @@ def test_less_than_a_sample_that_removes_little_is_corrected_and_not_counted() -
     (note,) = [note for note in found.notes if "not counted as an effect" in note]
     assert "less than one sample" in note
     # Nothing is asked for that would tell it from what is no delay.
-    assert "the delay that was taken out" not in {item.question for item in next_steps(found)}
+    assert "the delay that was corrected" not in {item.question for item in next_steps(found)}
     on_time = fitted(runs)
     off = [fit.value - on_time.value for fit in (found.before, found.after)]
     before, after = (

@@ -103,7 +103,7 @@ def test_a_fit_that_leaves_more_than_the_model_promises_no_band() -> None:
     assert (promised(3.9), promised(4.1)) == (30.0, 0.0)
 
 
-def test_a_search_is_told_where_it_is_quiet_and_stays_where_it_was_unless_all_stands_there(monkeypatch) -> None:
+def test_a_search_is_reported_where_it_is_quiet_and_stays_where_it_was_unless_all_stands_there(monkeypatch) -> None:
     module = sys.modules[select_model.__module__]
     data = {each.name: None for each in fields(Outcome)}
     searched = SimpleNamespace(step=SelectionStep.__new__(SelectionStep))

@@ -22,12 +22,12 @@ def pulled():
     return with_torque(exact_runs(), 1, lambda motion: -0.1 * motion.a[1])
 
 
-def test_a_rotor_below_zero_is_told_on_its_joint_alone():
+def test_a_rotor_below_zero_is_reported_on_its_joint_alone():
     first, second = possible_evidence(SHOWN, wls(observed(pulled())), ())
     assert first is SHOWN[0]
     assert (second.shown, second.lacks) == (False, True)
     assert second.why.startswith("P_d5 (")
-    assert "which no body and no rotor has" in second.why
+    assert "which no body or rotor can have" in second.why
 
 
 def test_bodies_and_rotors_above_zero_are_not():
@@ -44,5 +44,7 @@ def test_a_model_with_a_rotor_below_zero_is_not_complete():
     """A slide that a constant force pulled down had a rotor of -0.47 ± 0.01 kg m^2, and nothing said so."""
     found = diagnose(load_robot(), pulled(), bands=BANDS, catalogue=())
     assert found.verdict == "undecided"
-    assert sentences(found)[0] == "Undecided: something is missing, on joint2, that these recordings cannot name."
-    assert any("which no body and no rotor has" in said for said in sentences(found))
+    assert (
+        sentences(found)[0] == "Undecided: something is missing on joint2, but these recordings cannot show what it is."
+    )
+    assert any("which no body or rotor can have" in said for said in sentences(found))

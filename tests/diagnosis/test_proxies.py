@@ -73,7 +73,7 @@ def test_an_effect_may_stand_for_what_repeats_at_all_frequencies_alike() -> None
     assert outcome.repeating == {"joint1"}
     assert found(outcome) == set()
     (demoted,) = outcome.demoted
-    assert "of what repeats, and most of the rest stays unexplained" in demoted.why
+    assert "of what repeats, and most of what repeats would stay unexplained" in demoted.why
 
 
 def test_an_effect_need_not_remove_what_the_noise_of_positions_makes(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -84,7 +84,7 @@ def test_an_effect_need_not_remove_what_the_noise_of_positions_makes(monkeypatch
     made = np.zeros(2)
     monkeypatch.setattr("scara_ident.diagnosis.proxies.noise_torque", lambda *_: made)
     (proxy,) = proxies(believed, CRITERIA)
-    assert "most of the rest stays unexplained" in proxy.why
+    assert "most of what repeats would stay unexplained" in proxy.why
     made = np.array([1.1 * outcome.fit_after[0].missing, 0.0])
     assert proxies(believed, CRITERIA) == []
     # Repetitions of a motion prove no more than one of it does, for that noise repeats with them.
@@ -95,7 +95,7 @@ def test_an_effect_need_not_remove_what_the_noise_of_positions_makes(monkeypatch
     tried = round(2.0 * CRITERIA.family_error / once)
     many = replace(believed.search, step=replace(believed.search.step, tried=tried))
     (proxy,) = proxies(replace(believed, search=many), CRITERIA)
-    assert "with repetitions of a motion counted once" in proxy.why
+    assert "with the repetitions of a motion counted once" in proxy.why
 
 
 def test_where_something_stays_unexplained_repetitions_of_a_motion_count_once() -> None:
@@ -109,7 +109,7 @@ def test_where_something_stays_unexplained_repetitions_of_a_motion_count_once() 
     left = replace(outcome, unexplained=Unexplained("joint1", (), 0.01, 0.5), repeating=frozenset({"joint1"}))
     search = replace(outcome.search, step=replace(outcome.search.step, tried=tried))
     (proxy,) = proxies(replace(left, search=search), CRITERIA)
-    assert "with repetitions of a motion counted once" in proxy.why
+    assert "with the repetitions of a motion counted once" in proxy.why
     assert proxies(left, CRITERIA) == []
     assert proxies(replace(left, search=search, unexplained=None), CRITERIA) == []
 

@@ -52,14 +52,14 @@ def test_every_witness_is_heard():
     louder = replace(held_out, undisturbed=replace(held_out.undisturbed, joints=worse))
     shown = weighed_evidence(outcome, louder, (), NONE, CRITERIA)
     assert not any(item.shown for item in shown)
-    assert all("on the recordings held out is" in item.why for item in shown)
+    assert all("on the held-out recordings is" in item.why for item in shown)
     effect = SimpleNamespace(
         label="spring of joint1", joint="joint1", held_out=HeldOutGain(-0.1, 0.0, 0.01, "joint2", 0.1, 0.2)
     )
     first, second = weighed_evidence(outcome, held_out, [effect], NONE, CRITERIA)
     assert first.shown
     assert not second.shown
-    assert "spring of joint1 shows on the recordings held out" in second.why
+    assert "spring of joint1 shows on the held-out recordings" in second.why
     line = StandingLine(0, 5.0, 0.1, 0.9, True, 0.0)
     first, second = weighed_evidence(outcome, held_out, (), (line, None), CRITERIA)
     assert not first.shown

@@ -42,7 +42,7 @@ def bent() -> Diagnosis:
 
 
 @pytest.mark.slow
-def test_an_effect_is_told_by_one_number_and_one_standard_deviation() -> None:
+def test_an_effect_is_determined_by_one_number_and_one_standard_deviation() -> None:
     """Its coefficient among the parameters was that of another least squares, and surer than its size."""
     content = diagnosis_dict(bent())
     (effect,) = content["effects"]
@@ -52,7 +52,7 @@ def test_an_effect_is_told_by_one_number_and_one_standard_deviation() -> None:
 
 
 @pytest.mark.slow
-def test_what_is_predicted_follows_from_the_parameters_that_are_told() -> None:
+def test_what_is_predicted_follows_from_the_parameters_that_are_determined() -> None:
     """The columns of its term are made anew of the estimate, on training and held out, and so are the errors."""
     found = bent()
     (term,) = [term for term in found.after.model.terms if isinstance(term, EffectTerm)]

@@ -245,15 +245,15 @@ def test_the_pages_of_the_diagnosis_list_every_alias_and_the_limits_of_the_progr
     for said in (
         f"| lies outside the model | at least {CRITERIA.min_outside:.0e} ",
         f"| significant | p times candidates tried below {100 * CRITERIA.family_error:g} % |",
-        f"| gain on data not fitted to | at least {100 * CRITERIA.min_gain:g} % ",
+        f"| gain in cross-validation | at least {100 * CRITERIA.min_gain:g} % ",
         f"| helps in | at least {100 * CRITERIA.min_votes:g} % ",
         f"| larger than its uncertainty | by {CRITERIA.min_size:g} standard deviations",
         f"| larger than its final uncertainty | by {CRITERIA.min_final_size:g} standard deviations",
-        f"at most {100 * CRITERIA.min_colour:g} % of its power within the band",
+        f"at most {100 * CRITERIA.min_colour:g} % of the residual's power within the band",
         f"significant if they removed {100 * CRITERIA.min_power:g} % of",
-        f"at most {CRITERIA.worse_held_out:g} times that of the training",
+        f"at most {CRITERIA.worse_held_out:g} times the training error",
         f"explain by over {100 * CRITERIA.remainder_of_runs:g} % of the squared residual (else {100 * CRITERIA.remainder:g} %)",
-        f"removes as much as is asked with p at most {100 * CRITERIA.significant:g} % over all tried",
+        f"removes as much as required with p at most {100 * CRITERIA.significant:g} % over all tried",
         f"stands out by at least {100 * CRITERIA.colour_of_remainder:g} %",
         f"At most {CRITERIA.max_effects} effects per joint, and as many of the whole arm",
         f"at least {100 * CRITERIA.min_share:g} % of what it removes",
@@ -309,6 +309,6 @@ def test_what_the_readme_says_of_the_diagnosis_adds_up_from_its_page() -> None:
             )
         ),
         f"| {alone[0]} | SCARA03, UR5, Panda, nothing missing (3721 to 3723) | {alone[1]} | |",
-        f"same sets too {both[0]} of {both[1]}; of two or three effects, each above both, all in {more[0]} of {more[1]};",
+        f"were found in {both[0]} of {both[1]} sets; two or three effects, each above both limits, were all found in {more[0]} of {more[1]} sets;",
     ):
         assert said in readme, said

@@ -53,7 +53,7 @@ def test_the_stiffness_is_recovered(joint: str, stiffness: float):
 @pytest.mark.parametrize(
     ("of_inertia", "of_frequency", "power"), [(0.3, 1e-9, 1.0), (0.0, 0.15, -1.0), (0.2, 0.1, 0.0), (0.3, np.inf, -1.0)]
 )
-def test_a_stiffness_is_told_as_what_is_unsure_of_it_is(of_inertia: float, of_frequency: float, power: float):
+def test_a_stiffness_is_determined_as_what_is_unsure_of_it_is(of_inertia: float, of_frequency: float, power: float):
     """k = I (2 pi f)^2: even about itself with the inertia, and as its reciprocal with a frequency that nothing shows."""
     std = 5000.0 * np.hypot(of_inertia, 2.0 * of_frequency if np.isfinite(of_frequency) else 0.0)
     own = {"stiffness": Parameter(5000.0, std, "N m/rad"), "frequency": Parameter(20.0, 20.0 * of_frequency, "Hz")}
@@ -107,7 +107,7 @@ def test_what_no_gear_can_have_is_refused():
     assert JointElasticity().inadmissible(wide, Member(0, (30.0, 0.3)), soft, std) is None
     assert JointElasticity().inadmissible(replace(scene, band=20.0), Member(0, (30.0, 0.7)), soft, std) is None
     assert "negative" in str(Backlash().inadmissible(scene, Member(0, (1e-3,)), np.array([-1e-4]), std))
-    assert "rattle" in str(Backlash().inadmissible(scene, Member(0, (1e-3,)), np.array([0.2]), std))
+    assert "felt by hand" in str(Backlash().inadmissible(scene, Member(0, (1e-3,)), np.array([0.2]), std))
 
 
 @pytest.mark.parametrize(
@@ -204,4 +204,4 @@ def test_clearances_of_a_slide_are_shares_of_its_travel(tmp_path: Path, travel: 
     assert lower <= widths[0] and widths[-1] < upper
     std = np.array([1e-9])
     assert Backlash().inadmissible(scene, Member(0, (1e-3,)), np.array([0.01 * travel]), std) is None
-    assert "m would rattle" in str(Backlash().inadmissible(scene, Member(0, (1e-3,)), np.array([0.02 * travel]), std))
+    assert "m could be felt" in str(Backlash().inadmissible(scene, Member(0, (1e-3,)), np.array([0.02 * travel]), std))

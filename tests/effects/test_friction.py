@@ -168,7 +168,7 @@ def test_where_friction_as_a_whole_never_falls_that_is_said(viscous: float, fall
     assert AsymmetricFriction().or_else(beside, Member(1), np.array([0.05])) == ""
 
 
-def test_the_other_law_falls_by_the_speed_itself_and_is_told_as_such():
+def test_the_other_law_falls_by_the_speed_itself_and_is_reported_as_such():
     scene, other = scene_of(load_robot()), Stribeck(1)
     item, member = moving(scene.robot), Member(1, (0.2,))
     v = item.v[1] * scene.robot.drive_sign[1]

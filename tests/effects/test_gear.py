@@ -170,15 +170,18 @@ def test_the_other_law_is_without_the_gain_and_says_so():
     assert own.law() == {}
     assert (other.law()["loss_order"].value, other.law()["loss_order"].std) == (1.0, 0.0)
     said = own.description(scene, member)
-    assert other.description(scene, member) == f"{said}, as large where it is driven as where it drives"
+    assert (
+        other.description(scene, member)
+        == f"{said}, with the same loss whether the motor drives the load or the load drives the motor"
+    )
 
 
 def test_what_no_gear_can_have_is_refused():
     scene, member, std = scene_of(load_robot()), Member(1, (0.15,)), np.array([0.01])
     said = [TransmissionLoss().inadmissible(scene, member, np.array([x]), std) for x in (-0.1, 0.8, 0.1, 0.76)]
     assert said[:2] == [
-        "a gear cannot give energy: the lost share is negative",
-        "over three quarters of the torque would be lost",
+        "the lost share is negative, but a gear cannot give energy",
+        "more than three quarters of the torque would be lost",
     ]
     assert said[2:] == [None, None]
 

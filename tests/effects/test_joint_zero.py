@@ -136,7 +136,7 @@ def runs(arm: VirtualArm, effect: str | None, middle: float = 0.5) -> list[Recor
 
 @pytest.mark.slow
 @pytest.mark.parametrize("offset", [0.15, -0.6])
-def test_a_wrong_zero_is_found_and_told(offset: float):
+def test_a_wrong_zero_is_found_and_reported(offset: float):
     arm = virtual_arm(arm_of(*UPPER_ARM))
     found = diagnose(arm.robot, runs(arm, f"joint_zero:shoulder_lift_joint:offset={offset}"), model="basic")
     assert [item.label for item in found.effects] == ["joint_zero of shoulder_lift_joint"]

@@ -55,7 +55,7 @@ def test_columns_are_the_cube_the_torque_and_its_slope():
     assert np.array_equal(columns(TimeDelay(), smooth, item, Member(1))[1, 0], both[1])
 
 
-def test_members_are_those_that_can_be_told():
+def test_members_are_those_that_can_be_determined():
     scene = scene_of(load_robot())
     assert [member.joint for member in TorqueGainMismatch().members(scene)] == [1]
     assert [member.joint for member in TimeDelay().members(scene)] == [None, 0, 1]
@@ -66,10 +66,16 @@ def test_of_more_than_two_joints_the_first_may_have_the_wrong_scale_too():
     assert [member.joint for member in effect.members(scene)] == [0, 1, 2, 3, 4, 5]
     assert effect.estimated_beside(scene, Member(0)) is None
     assert effect.estimated_beside(scene, Member(4)) == Member(0)
-    assert effect.description(scene, Member(0)) == "a torque scale of its own, given over that of the joints not named"
-    assert effect.description(scene, Member(4)) == "a torque scale of its own, given over the first joint's"
+    assert (
+        effect.description(scene, Member(0))
+        == "a torque scale that differs from the other joints', relative to that of the joints not named"
+    )
+    assert (
+        effect.description(scene, Member(4))
+        == "a torque scale that differs from the other joints', relative to the first joint's"
+    )
     assert effect.or_else(scene, Member(4), np.array([0.1])) == ""
-    assert "nothing tells which" in effect.or_else(scene_of(load_robot()), Member(1), np.array([0.1]))
+    assert "it is not known which" in effect.or_else(scene_of(load_robot()), Member(1), np.array([0.1]))
 
 
 @pytest.mark.parametrize(("ratio", "said"), [(0.96, True), (1.04, True), (1.2, False), (0.8, False)])
@@ -80,7 +86,10 @@ def test_beside_a_gear_that_loses_it_may_be_that_this_loses_more_one_way(ratio: 
     words = effect.or_else_beside(Member(3), value, [lost])
     # Motor over load is ratio (1 + c) where it drives and ratio (1 - c) where it is driven; a gear that gives energy is none.
     drives, driven = ratio * 1.15 - 1.0, 1.0 - ratio * 0.85
-    assert (f"loses {drives:.1%} of the torque where it drives and {driven:.1%} where it is driven" in words) is said
+    assert (
+        f"loses {drives:.1%} of the torque when the motor drives the load and {driven:.1%} when the load drives the motor"
+        in words
+    ) is said
     assert (words == "") is not said
     assert effect.or_else_beside(Member(2), value, [lost]) == effect.or_else_beside(Member(3), value, []) == ""
 
@@ -243,7 +252,7 @@ def test_a_delay_is_taken_out_of_the_joints_that_have_it(joint: int | None):
 def test_a_delay_below_nothing_says_that_the_position_is_the_later_one():
     scene, delay = scene_of(load_robot()), TimeDelay()
     assert delay.or_else(scene, Member(None), np.array([0.005])) == ""
-    assert "the position is the later one" in delay.or_else(scene, Member(None), np.array([-0.005]))
+    assert "the position is later than the effort" in delay.or_else(scene, Member(None), np.array([-0.005]))
 
 
 def test_only_positions_that_are_late_by_more_than_a_sample_may_be_filtered():

@@ -22,7 +22,7 @@ def test_a_variance_below_zero_by_rounding_is_none():
     assert [deviation(covariance, k) for k in (0, 1)] == [2.0, 0.0]
 
 
-def test_an_interval_is_told_where_value_and_deviation_say_too_little():
+def test_an_interval_is_determined_where_value_and_deviation_say_too_little():
     stiffness = Parameter(3845.0, 1504.0, "N m/rad", symmetric_power=-1.0)
     low, high = stiffness.interval
     assert stiffness.entry() == {"value": 3845.0, "std": 1504.0, "unit": "N m/rad", "interval": [low, high]}
@@ -42,7 +42,7 @@ def test_an_interval_is_told_where_value_and_deviation_say_too_little():
         (NonlinearParameter("frequency", "Hz", 0.05, 200.0, symmetric_power=-2.0), -2.0),
     ],
 )
-def test_a_nonlinear_parameter_is_told_as_it_is_refined_unless_it_says_otherwise(
+def test_a_nonlinear_parameter_is_determined_as_it_is_refined_unless_it_says_otherwise(
     item: NonlinearParameter, symmetric_power: float
 ):
     assert item.parameter(0.2, 0.1, "rad") == Parameter(0.2, 0.1, "rad", symmetric_power)

@@ -159,7 +159,7 @@ def test_the_payload_of_some_recordings_is_recovered():
     start = {item.name: float(item.time[0]) for item in data}
     scene, effect = scene_of(robot, start=start), PayloadOfRecordings()
     member = effect.in_recordings(scene, Member(None), frozenset(["t_1", "t_3"]))
-    assert effect.description(scene, member) == "a payload in t_1, t_3, not in the others"
+    assert effect.description(scene, member) == "a payload in t_1, t_3 and not in the others"
     scene, value, covariance = fit(build_model(robot), data, effect, member, rounds=1)
     found = effect.parameters(scene, member, value, covariance)
     assert found["mass"].value == pytest.approx(0.8, abs=4.0 * found["mass"].std)
@@ -181,7 +181,7 @@ def test_the_payload_of_some_recordings_is_recovered():
     assert "negative" in str(effect.inadmissible(scene, member, -value, np.sqrt(np.diag(covariance))))
 
 
-@pytest.mark.parametrize(("inertia", "said"), [(0.048, "no body taken off"), (0.15, "carry less than the others")])
+@pytest.mark.parametrize(("inertia", "said"), [(0.048, "no removed body"), (0.15, "carry less than the others")])
 def test_a_negative_mass_with_moments_of_no_body_is_not_said_to_be_carried_less(inertia: float, said: str):
     """An Airbot's loaded run: -0.46 kg with a first moment of 0.24 kg m, 0.5 m off, and a moment of inertia of 0.048 kg m^2."""
     robot, effect = load_robot(example_urdf("ur5_robot.urdf")), PayloadOfRecordings()

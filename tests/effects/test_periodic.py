@@ -119,12 +119,14 @@ def test_one_is_said_in_the_singular():
     scene = scene_of(load_robot())
     assert TorqueRipple().description(scene, Member(0, (1.0,))) == "a torque ripple of 1 period per motor turn"
     assert TorqueRipple().description(scene, Member(0, (2.0,))) == "a torque ripple of 2 periods per motor turn"
-    assert EncoderEccentricity().description(scene, Member(0, (1.0,))) == "an encoder that errs once per motor turn"
+    assert (
+        EncoderEccentricity().description(scene, Member(0, (1.0,))) == "an encoder error with 1 period per motor turn"
+    )
 
 
 @pytest.mark.parametrize(
     ("order", "said"),
-    [(1.595, ", which would be 2 behind a reduction of 79.75"), (2.02, ", which would be 2 behind a reduction of 101"), (2.004, ""), (31.4, ""), (0.3, "")],
+    [(1.595, ", which would be 2 with a reduction of 79.75"), (2.02, ", which would be 2 with a reduction of 101"), (2.004, ""), (31.4, ""), (0.3, "")],
 )  # fmt: skip
 def test_periods_that_are_no_whole_number_ask_for_the_reduction(order: float, said: str):
     """Three wrists of a measured arm had lines of 1.6 and 8 periods behind a reduction taken for 100: behind one of 80 they are 2 and 10."""

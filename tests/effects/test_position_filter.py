@@ -16,7 +16,7 @@ from tests.effects.scenes import columns, fit, moving, scene_of
 from tests.effects.test_measurement import recordings
 
 
-def test_a_filter_of_the_positions_is_told_by_its_second_derivative():
+def test_a_filter_of_the_positions_is_recognised_by_its_second_derivative():
     """Of a mean over L, without its delay, the torque is that of the positions less L^2/24 of its second derivative."""
     samples, made = 61, []
     for item in recordings(lambda u, time: u, noise=1e-3):

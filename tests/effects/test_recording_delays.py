@@ -55,14 +55,14 @@ def test_the_mean_is_unsure_by_how_much_recordings_differ():
     assert (one[0].tolist(), one[1].tolist()) == ([0.001], [[4e-8]])
 
 
-def test_delays_that_do_not_differ_are_told_as_one():
+def test_delays_that_do_not_differ_are_reported_as_one():
     """Of a filter of the torque five recordings had a delay of 0.0154 s each, `by another time in each recording`."""
     value, covariance = 0.0154 + 1e-6 * np.arange(3), np.diag([4e-8, 1e-8, 4e-8])
     assert list(EFFECT.parameters(scene(), ARM, value, covariance)) == ["delay"]
-    assert EFFECT.or_else(scene(), ARM, value) == ", here by the same in all"
+    assert EFFECT.or_else(scene(), ARM, value) == "; here the delay is the same in all"
     slow = replace(scene(), rate=50.0)
     assert EFFECT.negligible(slow, ARM, value).startswith(
-        "effort and position are +15 ms apart, less than one sample, as when"
+        "effort and position are +15 ms apart, less than one sample, for example"
     )
     assert EFFECT.negligible(replace(scene(), rate=500.0), ARM, value) is None
     apart = value + np.array([0.0, 1e-3, 0.0])
@@ -73,15 +73,15 @@ def test_delays_that_do_not_differ_are_told_as_one():
 def test_what_is_asked_of_a_delay_is_asked_of_the_largest():
     here = replace(scene(), rate=500.0)
     small, large = np.array([0.001, -0.0005, 0.0]), np.array([0.001, -0.003, 0.0])
-    assert "-0.5 to +1 ms apart, by another time in each recording" in EFFECT.negligible(here, ARM, small)
+    assert "-0.5 to +1 ms apart, differently in each recording" in EFFECT.negligible(here, ARM, small)
     assert EFFECT.negligible(here, ARM, large) is None
     assert (
         EFFECT.inadmissible(here, ARM, 30.0 * large, np.full(3, 1e-4))
-        == "a delay of -0.09 s is longer than any measurement's"
+        == "a delay of -0.09 s is longer than any measurement has"
     )
     assert EFFECT.inadmissible(here, ARM, large, np.full(3, 1e-4)) is None
     assert EFFECT.settled(np.array([1e-6, -1e-5])) and not EFFECT.settled(np.array([0.0, -1e-4]))
-    assert "by less than nothing" in EFFECT.or_else(here, ARM, large)
+    assert "the delay is negative" in EFFECT.or_else(here, ARM, large)
     assert EFFECT.leaves(here, ARM, large) is None
 
 

@@ -47,7 +47,7 @@ def some() -> Scene:
     return scene([BOX, None, None, BOX, None])
 
 
-def test_recordings_with_a_payload_are_told_by_their_torque(some: Scene):
+def test_recordings_with_a_payload_are_recognised_by_their_torque(some: Scene):
     assert groups(some)[0] == {"r_0", "r_3"}
 
 
@@ -58,11 +58,14 @@ def test_what_is_known_to_be_bare_is_in_no_group(some: Scene):
     assert groups(some, ["r_0", "r_3"])[0] == {"r_1", "r_2", "r_4"}
     family = PayloadOfRecordings().knowing(frozenset(["r_0", "r_3"]))
     member = family.members(some)[0]
-    assert family.description(some, member) == "a payload in r_1, r_2, r_4, not in the others"
+    assert family.description(some, member) == "a payload in r_1, r_2, r_4 and not in the others"
     size = len(family.columns(some, member))
     body, std = np.array([-1.0, *[-0.1] * (size - 1)]), 0.01 * np.ones(size)
     why = family.inadmissible(some, member, body, std)
-    assert why == "its mass would be negative: these recordings carry less than the others, or differ by no body"
+    assert (
+        why
+        == "its mass would be negative: these recordings carry less than the others, or the difference is not a body"
+    )
 
 
 def test_two_payloads_make_three_groups():
@@ -76,7 +79,7 @@ def test_where_all_carry_the_same_there_is_no_group():
     assert groups(scene([None] * 2, noise=0.05)) == []
 
 
-def test_the_inverse_is_that_of_the_directions_told():
+def test_the_inverse_is_that_of_the_directions_determined():
     """Columns of very different sizes, one of them zero, and two the same."""
     rng = np.random.default_rng(5)
     columns = rng.standard_normal((2, 3, 20)) * np.array([1e-4, 1.0, 1e3])[:, None]

@@ -53,14 +53,20 @@ def test_of_two_joints_that_share_parameters_the_second_is_tried(tmp_path: Path)
     scene = scene_of(in_unit(CYLINDRICAL, 1.0, tmp_path))
     assert [member.joint for member in effect.members(scene)] == [2]
     assert effect.estimated_beside(scene, Member(2)) == Member(0)
-    assert "nothing tells which" in effect.or_else(scene, Member(2), np.array([0.2]))
+    assert "it is not known which" in effect.or_else(scene, Member(2), np.array([0.2]))
     assert effect.members(scene_of(in_unit(PLANAR_2R[:1], 1.0, tmp_path))) == ()
     # Behind a slide that is alone the ratio is to the scale of the first that turns.
     scene = scene_of(in_unit((SLIDES[2], TURN, TURN, TURN), 1.0, tmp_path))
     assert [member.joint for member in effect.members(scene)] == [1, 2, 3]
     assert effect.estimated_beside(scene, Member(3)) == Member(1) and effect.estimated_beside(scene, Member(1)) is None
-    assert effect.description(scene, Member(3)) == "a torque scale of its own, given over that of j2"
-    assert effect.description(scene, Member(1)) == "a torque scale of its own, given over that of the joints not named"
+    assert (
+        effect.description(scene, Member(3))
+        == "a torque scale that differs from the other joints', relative to that of j2"
+    )
+    assert (
+        effect.description(scene, Member(1))
+        == "a torque scale that differs from the other joints', relative to that of the joints not named"
+    )
     assert effect.or_else(scene, Member(3), np.array([0.2])) == ""
 
 
@@ -85,7 +91,7 @@ def test_the_joint_named_for_a_wrong_scale_depends_on_no_unit_of_length(tmp_path
         result = diagnose(robot, runs, bands=[8.0] * 3, catalogue=effects_named("torque_gain_mismatch"))
         (effect,) = result.effects
         found.append(effect.parameters["ratio"])
-        assert effect.joint == "j3" and effect.description.endswith("nothing tells which one's is wrong")
+        assert effect.joint == "j3" and effect.description.endswith("it is not known which one's is wrong")
     for ratio in found:
         assert ratio.value == pytest.approx(1.2, abs=4.0 * ratio.std)
         assert (ratio.value, ratio.std) == (

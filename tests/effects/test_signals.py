@@ -54,7 +54,7 @@ def test_a_torque_swings_by_what_is_beyond_the_low_pass_of_the_positions():
     assert np.array_equal(Signals(scene_of(robot), item).swing(0), np.zeros(item.samples))
 
 
-def test_an_armature_is_what_the_model_tells_else_what_an_effect_told_else_nominal():
+def test_an_armature_is_what_the_model_tells_else_what_an_effect_determined_else_nominal():
     scene = scene_of(load_robot())
     nominal = scene.robot.reduction**2 * scene.robot.rotor_inertia
     assert scene.known_armature(0) is None

@@ -143,7 +143,7 @@ def test_two_links_that_are_let_go_have_faded_after_their_memory():
         assert np.abs(each[:, memory:]).max() < 1e-6 * np.abs(each).max()
 
 
-def test_how_two_links_began_is_told_by_the_torques_of_both():
+def test_how_two_links_began_is_determined_by_the_torques_of_both():
     count, rate = 3000, 1.0 / STEP
     swing = two(count)
     free, true = free_swings(swing, count), np.array([0.01, -0.02, 0.5, 0.8])

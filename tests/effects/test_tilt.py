@@ -139,5 +139,7 @@ def test_what_only_the_first_joint_shows_is_no_tilt():
     spring_like = np.array([0.001, -0.002, 0.3, 0.4])
     assert "spring" in str(BaseTilt().inadmissible(scene, Member(None), spring_like, std))
     assert BaseTilt().inadmissible(scene, Member(None), np.array([0.02, 0.0, 0.14, 0.0]), std) is None
-    assert "lean" in str(BaseTilt().inadmissible(scene, Member(None), np.array([0.2, 0.0, 1.4, 0.0]), std))
-    assert "lean" in str(NominalBaseTilt().inadmissible(scene, Member(None, (1.0,)), np.array([0.2, 0.0]), std[:2]))
+    assert "tilted by" in str(BaseTilt().inadmissible(scene, Member(None), np.array([0.2, 0.0, 1.4, 0.0]), std))
+    assert "tilted by" in str(
+        NominalBaseTilt().inadmissible(scene, Member(None, (1.0,)), np.array([0.2, 0.0]), std[:2])
+    )

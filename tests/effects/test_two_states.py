@@ -60,7 +60,7 @@ def test_an_instant_that_cells_tell_is_known_to_a_cell():
 
 
 @pytest.mark.parametrize("share", [0.1, 0.4, 0.7])
-def test_an_instant_within_a_cell_is_told_by_how_full_it_is(share: float):
+def test_an_instant_within_a_cell_is_determined_by_how_full_it_is(share: float):
     """Of a cell of size s in which something acts for a share f of it the gain is (f - 1/2) s."""
     bounds = np.linspace(0.0, 10.0, 101)
     acts = np.where(bounds[1:] > 3.05, 1.0, 0.0)

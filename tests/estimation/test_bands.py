@@ -138,7 +138,7 @@ def test_torque_that_has_nothing_to_do_with_motion_is_said(model: TorqueModel, c
     torque = np.array([clean.effort[0], 5.0 * rng.standard_normal(clean.effort.shape[1])])
     found = choose_bands(model, prepare([replace(clean, effort=torque)]))
     (note,) = found.notes
-    assert note.startswith("j2: its motion explains under half of its torque at every frequency")
+    assert note.startswith("j2: at every frequency its motion explains less than half of its torque")
     assert found.explained[1] == 0.0
 
 

@@ -311,7 +311,7 @@ def test_what_white_residuals_show_does_not_depend_on_how_many_blocks_are_worked
     np.testing.assert_allclose(estimated(rows, ends=(2,))[1].matrix, together.matrix, rtol=1e-12)
 
 
-def test_a_direction_that_is_hardly_told_does_not_make_all_infinitely_unsure():
+def test_a_direction_that_is_hardly_determined_does_not_make_all_infinitely_unsure():
     """Rounding of its inverse makes the leverage of all rows along it larger than 1."""
     rng = np.random.default_rng(15)
     w = smooth_columns(rng, 1500, 8)

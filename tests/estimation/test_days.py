@@ -25,7 +25,7 @@ def partition(labels: np.ndarray) -> set[frozenset[int]]:
 
 
 @given(st.integers(0, 20), st.permutations([0, 0, 1, 1, 1, 2]), st.floats(1e-6, 1e6))
-def test_days_are_told_in_any_order_and_unit(seed: int, days: list[int], unit: float):
+def test_days_are_reported_in_any_order_and_unit(seed: int, days: list[int], unit: float):
     off, unsure, std = offsets(seed % 3, days)
     told = same_day(unit * off, unit**2 * unsure, unit * std)
     assert told is not None

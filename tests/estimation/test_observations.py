@@ -206,13 +206,13 @@ def test_a_recording_at_rest_is_refused_in_one_line(model: TorqueModel, one: Rec
     with pytest.raises(RecordingError) as caught:
         seen(model, one, still)
     message = str(caught.value)
-    assert message.startswith("here/still_1.csv: nothing is left of 6000 samples")
+    assert message.startswith("here/still_1.csv: none of 6000 samples can be used")
     assert "\n" not in message
 
 
 def test_a_recording_shorter_than_its_ends_is_refused(model: TorqueModel):
     short = swing(model.robot, seconds=0.3)
-    with pytest.raises(RecordingError, match="nothing is left of 150 samples"):
+    with pytest.raises(RecordingError, match="none of 150 samples can be used"):
         seen(model, short, bands=(5.0, 5.0))
 
 

@@ -18,7 +18,7 @@ def test_an_arm_pushes_nowhere():
 
 
 @pytest.mark.parametrize("joint", [0, 1])
-def test_where_viscous_friction_is_turned_round_it_pushes_most_surely_where_it_is_told_best(joint: int):
+def test_where_viscous_friction_is_turned_round_it_pushes_most_surely_where_it_is_determined_best(joint: int):
     """The law of the formulas less four times the speed, at the speed told: closed form."""
     training = observed(with_torque(exact_runs(), joint, lambda motion: -4.0 * motion.v[joint]))
     estimate = wls(training)

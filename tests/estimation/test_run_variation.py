@@ -65,7 +65,7 @@ def test_how_far_runs_differ_is_found():
         assert late.startswith(
             "effort comes late by another time in each run, on all joints alike (standard deviation "
         )
-        assert doubted == [each[0] + "; what is unexplained may make it seem so", each[1], late]
+        assert doubted == [each[0] + "; the unexplained part may cause this", each[1], late]
         # The runs' delays are about zero, so that their spread is their size.
         assert [joint["delay"] for joint in estimate.variation.sizes(ROBOT).values()] == [
             np.std(item.of_run[:, 3], ddof=1) for item in estimate.variation.joints if item is not None
@@ -121,7 +121,7 @@ def test_a_delay_that_all_runs_have_alike_is_no_difference():
 
 
 @pytest.mark.parametrize(("count", "told"), [(3, False), (8, True)])
-def test_a_delay_alike_is_told_of_enough_runs(count: int, told: bool):
+def test_a_delay_alike_is_reported_of_enough_runs(count: int, told: bool):
     """`leads by 15 ms in all runs alike`, of three pieces of a chirp, whose delays scatter by a third of that."""
     late = 0.012 + 0.004 * np.linspace(-1.0, 1.0, count)
     delay = np.arange(4) == KINDS.index("delay")
@@ -130,7 +130,7 @@ def test_a_delay_alike_is_told_of_enough_runs(count: int, told: bool):
     assert late_alike(item) == (pytest.approx(0.012) if told else 0.0)
     (said,) = RunVariation((item, None)).sentences(ROBOT)
     assert said == (
-        "joint1 lags by 12 ms in " + ("all runs alike" if told else "3 runs, which are too few to tell a delay")
+        "joint1 lags by 12 ms in " + ("all runs alike" if told else "3 runs, which are too few to determine a delay")
     )
 
 
@@ -167,7 +167,7 @@ def test_more_than_a_radian_of_the_band_is_no_delay(apart: float):
     far = replace(item, std=3.0 * item.reach * delay, of_run=late[:, None] * delay)
     said = " ".join(RunVariation((far, None)).sentences(ROBOT))
     assert " ms" not in said and "its delay" not in said
-    assert "what follows the slope of its torque by more than any delay would" in said
+    assert "a part in proportion to its torque's derivative that is too large for a delay" in said
     near = replace(item, std=0.5 * item.reach * delay, of_run=np.outer([0.5 * item.reach] * 4, delay))
     assert "lags by" in " ".join(RunVariation((near, None)).sentences(ROBOT))
 

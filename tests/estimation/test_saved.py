@@ -70,5 +70,5 @@ def test_a_file_that_is_none_or_of_another_robot_is_refused(results: Results, tm
     content = json.loads(path.read_text())
     content["estimate"]["value"].pop()
     path.write_text(json.dumps(content))
-    with pytest.raises(UsageError, match=r"its estimate is not whole .*; save it again"):
+    with pytest.raises(UsageError, match=r"its estimate is incomplete .*; save it again"):
         load_estimate(path, results.robot)

@@ -46,7 +46,7 @@ def scales(robot: Robot, run: Recording, gains: tuple[float, float]) -> dict[str
         ((0.01, 0.01), r"All inertial parameters are 0\.01 of the URDF's: is effort_gain right\?"),
     ],
 )
-def test_the_scale_of_each_joint_is_told(arm, gains, said):
+def test_the_scale_of_each_joint_is_determined(arm, gains, said):
     robot, run = arm
     found = scales(robot, run, gains)
     # Noise of 0.05 N m, beside some 5 N m of gravity.
@@ -73,12 +73,12 @@ def test_where_friction_brakes_no_gain_of_opposite_sign_is_suspected(tmp_path):
     estimate = wls(observations)
     assert friction_sides(estimate, observations).brakes == robot.joints
     said = scale_in_words(estimate, observations)
-    assert "the opposite sign of the URDF's on j1, j2, though friction brakes there" in said
+    assert "the opposite sign of the URDF's on j1, j2, but friction brakes there" in said
     assert "negate" not in said
     pushed = observe(model, prepare([replace(run, effort=-run.effort - 2.0 * np.sign(rate))], (8.0, 8.0)))
     said = scale_in_words(wls(pushed), pushed)
     assert (
-        "on j1, j2, and friction feeds energy in there: efforts or positions count backwards, negate effort_gain"
+        "on j1, j2, and friction feeds energy in there: efforts or positions have the wrong sign; negate effort_gain"
         in said
     )
 
@@ -100,13 +100,13 @@ def test_friction_brakes_by_all_of_its_law_together(tmp_path):
     assert found.brakes == ("j2",) and found.pushes == ("j1",)
     said = scale_in_words(estimate, observations)
     assert "on j1, and friction feeds energy in there" in said
-    assert "They have it on j2, though friction brakes there" in said
+    assert "They also have the opposite sign on j2, but friction brakes there" in said
 
 
 def test_joints_that_differ_are_named(arm):
     said = scale_sentence({"j1": 1.1, "j2": 30.0}, arm[0])
     assert said.endswith(
-        "Torques of the bodies are 30 times the URDF's on j2: is effort_gain right there, or are the masses others?"
+        "Torques of the bodies are 30 times the URDF's on j2: is effort_gain right there, or do the masses differ?"
     )
 
 
@@ -130,10 +130,10 @@ def test_a_urdf_that_does_not_show_says_nothing_of_scale(arm):
     assert scales(robot, replace(run, effort=rng.standard_normal(run.effort.shape)), (1.0, 1.0)) == {}
     # A KUKA's second joint follows its URDF with a correlation of 0.998, in too few samples to tell the scale.
     assert scale_sentence({}, robot).endswith(
-        "whether the torques are those of the URDF's bodies, these recordings do not tell."
+        "these recordings do not show whether the torques are those of the URDF's bodies."
     )
     assert scale_sentence(None, robot) == (
-        "No recording tells a scale common to all torques and masses: it rests on effort_gain."
+        "Recordings cannot determine a common scale of all torques and masses: it depends on effort_gain."
     )
 
 
@@ -158,7 +158,7 @@ def test_joints_left_out_are_named(arm, tmp_path):
     assert list(urdf_scale(*seen)) == ["j1"]
     assert unlike_urdf(*seen) == ("j2",)
     assert scale_sentence(urdf_scale(*seen), other, unlike_urdf(*seen)).endswith(
-        "On j2 they are not the URDF's in any scale."
+        "On j2 no scale makes them those of the URDF."
     )
     own = observe(build_model(robot, "basic"), prepare([run], (8.0, 8.0)))
     assert unlike_urdf(wls(own), own) == ()
@@ -168,7 +168,7 @@ def test_of_time_it_is_said_where_no_joint_feels_gravity(arm):
     robot, _ = arm
     upright = load_robot()
     assert (gravity_acts(robot), gravity_acts(upright)) == (True, False)
-    assert ", nor, without gravity, that of time: they rest on effort_gain" in scale_sentence(None, upright)
+    assert ", nor, without gravity, the scale of time: these depend on effort_gain" in scale_sentence(None, upright)
     assert "time" not in scale_sentence(None, robot)
 
 
@@ -185,7 +185,7 @@ def test_nothing_is_asked_for_a_light_joint_whose_centre_of_mass_is_a_little_off
     said = scale_in_words(*seen)
     assert "right?" not in said
     assert said.endswith(
-        " times the URDF's on j2, but so small there that a centre of mass a little off makes as much."
+        " times the URDF's on j2, but they are so small there that a small error of a centre of mass explains this."
     )
     # Of a joint that bears much it is asked, and of all alike.
     heavy = observe(build_model(stated, "basic"), prepare([replace(run, effort=100.0 * run.effort)], (8.0, 8.0)))
@@ -194,6 +194,7 @@ def test_nothing_is_asked_for_a_light_joint_whose_centre_of_mass_is_a_little_off
     alike = scale_sentence({"j1": 100.0, "j2": 110.0}, stated, (), ("j2",))
     assert alike.endswith("All inertial parameters are 1e+02 of the URDF's: is effort_gain right?")
     for alone in (-4.0, 4.0):
-        assert f"Torques of the bodies are {alone:g} times the URDF's on j2, but so small there" in scale_sentence(
-            {"j2": alone}, stated, (), ("j2",)
+        assert (
+            f"Torques of the bodies are {alone:g} times the URDF's on j2, but they are so small there"
+            in scale_sentence({"j2": alone}, stated, (), ("j2",))
         )

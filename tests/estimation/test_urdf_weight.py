@@ -59,7 +59,7 @@ def test_a_counterweight_is_no_gain(lift):
     said = scale_in_words(*found)
     assert "right?" not in said
     assert said.endswith(
-        "Weight and inertia of the bodies are 0.36 and 1.5 times the URDF's on j1, which no effort_gain makes: the URDF "
+        "Weight and inertia of the bodies are 0.36 and 1.5 times the URDF's on j1, which no effort_gain explains: the URDF "
         "lacks a counterweight, a balancing spring or cylinder, or a payload."
     )
     # Seen at the lift its mass counts twice: in inertia for what it is, and for what the weight has lost.
@@ -101,8 +101,8 @@ def test_on_a_joint_that_turns_a_centre_of_mass_may_lie_elsewhere(tmp_path):
     q = state(robot)[0]
     weight = rnea(robot, q, np.zeros_like(q), np.zeros_like(q))[0]
     said = scale_in_words(*seen(robot, (-0.7 * weight, 0.0)))
-    assert "times the URDF's on j1, which no effort_gain makes" in said
-    assert said.endswith("or a payload, or has a centre of mass elsewhere.")
+    assert "times the URDF's on j1, which no effort_gain explains" in said
+    assert said.endswith("or a payload, or a centre of mass in the URDF is wrong.")
 
 
 def test_a_centre_of_mass_a_little_off_on_a_wrist_is_no_counterweight(tmp_path, monkeypatch):

@@ -111,7 +111,7 @@ def test_a_slow_motion_foresees_the_torques_of_a_fast_one(robot: Robot):
 
 
 @pytest.mark.parametrize(("size", "same"), [(1.0, True), (0.05, False)])
-def test_an_estimate_that_is_told_well_is_believed_itself(robot: Robot, size: float, same: bool):
+def test_an_estimate_that_is_determined_well_is_believed_itself(robot: Robot, size: float, same: bool):
     """What was made of it need not be made again."""
     found = observations(robot, 6, (size, size), noise=1e-3)
     told = wls(found).value

@@ -26,7 +26,7 @@ def by_difference(q, value, step=1e-6):
 def test_two_spheres(tmp_path):
     clearance = clearance_of(upright(tmp_path, BALL, "", '<sphere radius="0.1"/>'), *ENDS, margin=0.02)
     assert clearance.groups == ("self",)
-    assert clearance.notes == ("Links without a collision shape are not watched: l2.",)
+    assert clearance.notes == ("Links without a collision shape are not checked: l2.",)
     q = drawn()
     expected = np.linalg.norm(middle(q, 2) - middle(q, 0), axis=0) - 0.15
     near = clearance.nearest(q, np.inf)

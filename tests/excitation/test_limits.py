@@ -82,7 +82,7 @@ def test_the_scara_has_the_papers_tool_acceleration_and_other_arms_none():
     np.testing.assert_allclose(half.centre, limits_of(SCARA).centre)
 
 
-def test_the_scara_is_foreseen_with_the_papers_friction_unless_told_better():
+def test_the_scara_is_foreseen_with_the_papers_friction_unless_determined_better():
     names = COMPLETE.names
     value = nominal_parameters(COMPLETE)
     np.testing.assert_array_equal(value[5:], table5_parameters("OJD")[5:])

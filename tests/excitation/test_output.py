@@ -89,7 +89,7 @@ def test_rotors_that_nobody_stated_are_named_with_what_they_would_make_of_a_torq
 def test_a_fast_motion_is_noted(made):
     assert not any("Hz" in line for line in notes(made))
     fast = tuple(replace(each, basis=make_basis(1.0, 6)) for each in made.trajectories)
-    assert any("reaches 6 Hz, where many arms swing" in line for line in notes(replace(made, trajectories=fast)))
+    assert any("reaches 6 Hz, where many arms oscillate" in line for line in notes(replace(made, trajectories=fast)))
 
 
 def test_ros_2_reads_the_joint_trajectory(made, tmp_path):

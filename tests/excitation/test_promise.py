@@ -48,12 +48,12 @@ def test_of_what_may_be_below_the_limit_that_which_would_not_be_found_is_named()
     spring, tilt = expected_answers(inquire(found, each), [motion])
     assert spring.settled and spring.unshown == () and spring.instead == ""
     assert not tilt.settled and tilt.unshown == ("base_tilt",)
-    assert tilt.instead == "Would not tell: base_tilt. What would: weigh it."
+    assert tilt.instead == "This motion does not settle: base_tilt. To settle it: weigh it."
     # Of several, what brings out those that it does not tell.
     both = Question("below_limit", "all", (first, faint), experiment="weigh it")
     (item,) = expected_answers(inquire(found, [both]), [motion])
     assert item.unshown == ("base_tilt",)
-    assert item.instead == f"Would not tell: base_tilt. What would: {faint.candidate.effect.experiment}."
+    assert item.instead == f"This motion does not settle: base_tilt. To settle it: {faint.candidate.effect.experiment}."
 
 
 def test_the_least_that_would_be_found_is_as_large_as_needed():
@@ -74,7 +74,7 @@ def test_the_least_that_would_be_found_is_as_large_as_needed():
     assert (name, limit.unit) == ("stiffness", "N m/rad")
     assert own.times > 1.0 and limit.value == pytest.approx(abs(spring.value[0]) / own.times)
     assert item.entry()["detection_limit"] == {"spring of joint1": {"stiffness": limit.value}}
-    assert f"The least that would be found: spring of joint1, stiffness {limit.value:.2g} N m/rad." in item.words
+    assert f"Smallest sizes that would be found: spring of joint1, stiffness {limit.value:.2g} N m/rad." in item.words
     assert shown((limit.value,))[1].times == pytest.approx(1.0)
     smaller, _ = shown((0.9 * limit.value,))
     assert smaller.unshown == ("spring of joint1",) and not smaller.settled
@@ -98,5 +98,5 @@ def test_of_what_the_motion_holds_too_few_periods_to_be_tried_is_named(kind: Kin
     assert per_turn * reach < PERIODS_COVERED < per_turn * np.ptp(wide.q[0])
     (near,), (far,) = expected_answers(inquiry, [small]), expected_answers(inquiry, [wide])
     assert near.unshown == ("ripple of joint1",) and not near.settled
-    assert near.instead == f"Would not tell: ripple of joint1. What would: {Slow.experiment}."
+    assert near.instead == f"This motion does not settle: ripple of joint1. To settle it: {Slow.experiment}."
     assert far.unshown == () and far.settled == (kind == "below_limit" or far.after >= SURE_STANDARD_ERRORS)

@@ -28,7 +28,7 @@ def test_the_design_depends_on_the_seed_alone(short):
 
 
 @pytest.mark.slow
-def test_progress_is_told_after_every_search():
+def test_progress_is_reported_after_every_search():
     seen = []
     effort = replace(QUICK, rounds=1, seed=4)
     made = design_excitation(COMPLETE, **SHORT, effort=effort, progress=seen.append)
@@ -40,7 +40,7 @@ def test_parameters_that_no_motion_tells_apart_are_said():
     """The weight on an axis that goes up and down, beside an offset that the models leave out for that."""
     robot = scara_with_quill()
     whole = TorqueModel("complete", robot, (rigid_body(robot), Friction(robot), Offset(robot)))
-    with pytest.raises(InfeasibleLimits, match=r"no motion can tell .*m3, Ia3, p_o3 apart"):
+    with pytest.raises(InfeasibleLimits, match=r"no motion can distinguish .*m3, Ia3, p_o3 in"):
         design_excitation(whole, duration=6.0)
     assert "p_o3" not in build_model(robot).names
 

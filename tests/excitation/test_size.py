@@ -25,7 +25,7 @@ def test_sizes_that_no_search_handles_are_refused():
     check_size(150, 2, 1, 2500)
     with pytest.raises(UsageError, match="use at most 150"):
         check_size(151, 2, 1, 2500)
-    with pytest.raises(UsageError, match="harmonic 700: 2500 samples cannot tell"):
+    with pytest.raises(UsageError, match="harmonic 700: 2500 samples cannot resolve"):
         check_size((1, 700), 2, 1, 2500)
     with pytest.raises(UsageError, match="3 durations for 2 trajectories"):
         durations_of((5.0, 6.0, 7.0), 2)

@@ -42,7 +42,7 @@ def test_the_first_motion_that_suffices_is_named(pair):
 
 
 @pytest.mark.slow
-def test_recordings_at_hand_count_and_the_worst_parameter_is_told(pair):
+def test_recordings_at_hand_count_and_the_worst_parameter_is_reported(pair):
     design, each = pair
     known = replace(design, prior=each.scaled(3.0))
     std = std_of(each) / 3.0
@@ -50,7 +50,7 @@ def test_recordings_at_hand_count_and_the_worst_parameter_is_told(pair):
     assert (found.suffices, found.repetitions) == (0, 0)
     assert (found.after[0].motions, found.after[0].parameter) == (0, "P_d1")
     assert stopping(known, {"P_d1": 0.95 * std[0]}).repetitions == 1
-    assert "no more of them pay. Not judged, as no value is known to take a percentage of: a01." in found.words()
+    assert "no more are needed. Not judged, because no value is known to take a percentage of: a01." in found.words()
 
 
 def test_what_is_asked_is_read():
@@ -58,7 +58,7 @@ def test_what_is_asked_is_read():
     assert asked_std(["10", "a01=0.02"], VALUES) == ({"a01": 0.02, "P_d1": 1.0, "P_d2": 0.05}, ())
     assert asked_std(["a01=0.02"], VALUES) == ({"a01": 0.02}, ())
     for words, said in (
-        (["0"], "expected a percentage"), (["a01=5%"], "expected a percentage"), (["b=1"], "'b' is not asked for"),
+        (["0"], "expected a percentage"), (["a01=5%"], "expected a percentage"), (["b=1"], "'b' is not among"),
         (["5", "6"], "two percentages"),
     ):  # fmt: skip
         with pytest.raises(UsageError, match=said):

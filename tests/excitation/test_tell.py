@@ -54,7 +54,7 @@ def test_the_motion_keeps_its_limits_and_is_said_to_tell(asked):
 
 
 @pytest.mark.slow
-def test_what_was_promised_is_seen_and_the_effect_is_told(asked):
+def test_what_was_promised_is_seen_and_the_effect_is_reported(asked):
     inquiry, design = asked
     time = np.linspace(0.0, 6.0, 3001)
     trajectory = design.trajectories[0]

@@ -67,7 +67,7 @@ def test_an_effect_that_recordings_held_out_speak_against_is_said_beside_and_in_
         )
     )
     done = export_model(replace(models["scara", False], found=entries), to)
-    said = "spring of joint1 is in doubt: 10 ± 5 % of it shows on the recordings held out"
+    said = "spring of joint1 is in doubt: 10 ± 5 % of it shows on the held-out recordings"
     assert [note for note in done.notes if "in doubt" in note] == [said]
     code = [text for name, text in done.files.items() if name.endswith((".h", ".py"))]
     assert code

@@ -110,7 +110,7 @@ def test_friction_does_not_stand_in_for_what_was_carried_at_times(tmp_path: Path
     np.testing.assert_allclose(said.value[free], expected, rtol=1e-6, atol=1e-8)
 
 
-def test_friction_that_no_recording_told_is_not_known(tmp_path: Path):
+def test_friction_that_no_recording_determined_is_not_known(tmp_path: Path):
     found = identified(scara(tmp_path), samples=60)
     open_ = found.undetermined.copy()
     open_[places(found, Friction, (1,))[1]] = True

@@ -22,7 +22,7 @@ def test_friction_that_the_data_leave_open_stays_the_file_s() -> None:
     assert "joint1: viscous friction is not known and was not written" in notes
 
 
-def test_friction_below_zero_is_not_written_and_told() -> None:
+def test_friction_below_zero_is_not_written_and_reported() -> None:
     robot = load_robot()
     text, notes = urdf_text(
         robot, robot.standard_parameters(), JointFriction(np.array([0.1, 0.1]), np.array([0.01, -0.02]))

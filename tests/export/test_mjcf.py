@@ -162,7 +162,7 @@ def test_a_free_arm_keeps_its_energy_in_simulation() -> None:
 @pytest.mark.parametrize("kind", ["point", "rod", "plate", "just outside"])
 @given(seed=SEEDS)
 @settings(max_examples=8)
-def test_a_body_on_the_edge_of_the_possible_is_taken_and_told(kind: str, seed: int) -> None:
+def test_a_body_on_the_edge_of_the_possible_is_taken_and_reported(kind: str, seed: int) -> None:
     robot = load_robot()
     rng = np.random.default_rng(seed)
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]

@@ -88,7 +88,7 @@ def test_no_file_is_written_of_an_arm_that_cannot_exist(export, found, tmp_path:
     assert robot_files(identified_model(found)) == ({}, ("no URDF and no MJCF is written: no arm is found",))
 
 
-def test_a_link_that_cannot_exist_is_named_and_the_other_file_told(found):
+def test_a_link_that_cannot_exist_is_named_and_the_other_file_reported(found):
     model = identified_model(found)
     standard = possible_standard(model)[0].copy()
     standard[10] = -1.0

@@ -223,7 +223,7 @@ def test_rotor_inertias_without_a_place_are_in_a_comment_and_a_note(branched: Ro
     assert "wrist: 5.714e-05" in note
 
 
-def test_a_rotor_inertia_that_the_description_overrides_is_told(tmp_path: Path) -> None:
+def test_a_rotor_inertia_that_the_description_overrides_is_reported(tmp_path: Path) -> None:
     (tmp_path / "arm.urdf").write_bytes(load_robot().urdf.read_bytes())
     path = tmp_path / "robot.yaml"
     path.write_text("urdf: arm.urdf\neffort_side: motor\njoints:\n  joint1: {rotor_inertia: 0.002}\n  joint2: {}\n")
@@ -294,6 +294,6 @@ def test_another_encoding_becomes_utf8(branched: Robot) -> None:
     assert "branched.urdf was in another encoding; this is UTF-8" in notes
 
 
-def test_relative_meshes_are_told(branched: Robot) -> None:
+def test_relative_meshes_are_reported(branched: Robot) -> None:
     _, notes = urdf_text(branched, random_standard(branched, 0))
     assert notes[0] == "names of meshes are relative to the folder of the original branched.urdf"

@@ -107,7 +107,7 @@ def test_what_is_no_xml_is_one_line(content: bytes):
         parse(content, PATH)
 
 
-def test_other_encodings_become_utf8_and_a_false_declaration_is_told(tmp_path: Path):
+def test_other_encodings_become_utf8_and_a_false_declaration_is_reported(tmp_path: Path):
     path = tmp_path / "arm.xml"
     text = '<?xml version="1.0" encoding="ISO-8859-1"?><robot name="Fuß"/>'
     path.write_bytes(text.encode("latin-1"))

@@ -54,7 +54,7 @@ def test_what_differs_from_run_to_run_has_five_directions_on_each_joint(historie
     assert len(history.dates) == len(DATES)
 
 
-def test_sizes_are_told_as_an_effects_parameters(histories):
+def test_sizes_are_reported_as_an_effects_parameters(histories):
     history = histories[0]
     ripple = next(cause for cause in history.causes if cause.effect == "torque_ripple")
     told = sizes_in_words(ripple, history.scene, np.array([0.03, 0.04]), np.eye(2) * 1e-6)

@@ -35,7 +35,7 @@ def test_the_parts_of_friction_differ_together_or_apart_as_they_were_drawn(share
     np.testing.assert_allclose(found / np.outer(std, std), truth / np.outer(std, std), atol=0.1)
 
 
-def test_what_only_a_sum_tells_is_told_in_sum():
+def test_what_only_a_sum_tells_is_determined_in_sum():
     """A weight lifted slowly: torque scale and offset are one direction, and each alone was lost in noise in half of the fleets."""
     std, random = np.array([0.015, 0.02, 0.005, 0.02, 1e-4]), np.random.default_rng(1)
     noise = np.diag((0.1 * std) ** 2)
@@ -91,7 +91,7 @@ def test_a_slow_axis_that_lifts_has_no_payload_either():
 
 
 @pytest.mark.slow
-def test_a_payload_is_told_in_kg_and_what_it_leaves_over_is_no_other_change(monkeypatch):
+def test_a_payload_is_reported_in_kg_and_what_it_leaves_over_is_no_other_change(monkeypatch):
     scatter = (0.02, 0.03, 0.002, 0.02)
     fleet = quill_fleet(0, scatter, payload=5.0)
     (told,) = (sentences(found, fleet[1].scene) for found in changes_of(fleet).values() if found)

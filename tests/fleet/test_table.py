@@ -50,7 +50,7 @@ def test_a_quantity_has_the_first_of_the_changes_of_its_cause(histories):
     assert _change_of(item, "2026-02-01", (late, early)) is None
 
 
-def test_scatter_is_told_of_coefficients_as_that_of_an_amplitude_near_zero_is_less():
+def test_scatter_is_determined_of_coefficients_as_that_of_an_amplitude_near_zero_is_less():
     random = np.random.default_rng(0)
     values = 2.0 * random.standard_normal((40, 8, 2)) + random.standard_normal((40, 8, 2))
     arms = [[{"coefficients": (value, np.ones(2))} for value in dates] for dates in values]

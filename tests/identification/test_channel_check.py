@@ -138,7 +138,7 @@ def test_an_effort_of_opposite_sign_shows_where_friction_is_slight(tmp_path: Pat
     assert not any("ravity" in said.split("tells a scale")[0] for said in sentences(found))
 
 
-def test_all_efforts_of_opposite_sign_are_told_by_gravity_and_inertia(tmp_path: Path) -> None:
+def test_all_efforts_of_opposite_sign_are_recognised_by_gravity_and_inertia(tmp_path: Path) -> None:
     robot, run = lightly_braked(tmp_path, -1.0)
     with pytest.raises(RecordingError, match=r"negate effort_gain of all .*\(effort_gain: -1"):
         diagnose(robot, [run], model="basic")

@@ -62,7 +62,7 @@ def test_the_zeros_of_all_joints_are_one_fault_and_signs_of_others_their_own() -
     assert zeros.readings == {"a": reading[0], "c": reading[2]}
     assert (sign.signal, sign.joints) == ("effort", ("b",))
     said = str(zeros)
-    assert "falls from 100 to 1 % (as it does with gravity upside down)" in said
+    assert "falls from 100 to 1 % (it does so too with gravity upside down)" in said
     assert "with +90 deg on a and +180 deg (position of opposite sign) on c" in said
     assert "negate position scale and offset of c in robot.yaml, then add in robot.yaml" in said
     assert "offset: {a: 1.57080, c: 3.14159} in rad" in said

@@ -66,7 +66,7 @@ def test_sensors_zeroed_before_each_run_are_no_bias(clean):
         for run in exact_runs(3)
     ]
     found = compare(ROBOT, runs, bands=BANDS)
-    assert "an offset of each one's own" in " ".join(found.notes)
+    assert "each recording's own offset" in " ".join(found.notes)
     assert not any("an offset of each" in note for note in clean.notes)
     np.testing.assert_allclose(found.errors, clean.errors, rtol=0.1)
     assert np.all(found.errors / found.expected < 1.5)

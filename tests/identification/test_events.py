@@ -55,7 +55,9 @@ def test_a_push_is_found_with_its_times_and_force_and_only_that():
     assert set(event.entry) == {"recording", *ends, "joints", "rms", "rms_by_joint", "kind", "force"}
     assert event.sizes[0] == event.rms
     # Where the force acts is not known.
-    assert event.sentence(ROBOT).endswith(f"{np.linalg.norm(event.force):.3g} N if at the tool; left out of the fit")
+    assert event.sentence(ROBOT).endswith(
+        f"{np.linalg.norm(event.force):.3g} N if it acts at the tool; left out of the fit"
+    )
     other = observed(plain)
     assert find_events(other, robust_fit(other).value) == ()
 
@@ -142,9 +144,9 @@ def test_each_joint_has_its_own_size_the_largest_first():
 
 def test_of_a_recording_explained_worse_for_no_known_reason_none_is_given():
     whole = Event("run", 0.0, 12.0, ("joint1",), 0.5, "unknown", held_out=True)
-    assert whole.sentence(ROBOT) == "run is explained much worse than the recordings fitted: 0.5 N m on joint1"
+    assert whole.sentence(ROBOT) == "run is explained much worse than the fitted recordings: 0.5 N m on joint1"
     unsure = replace(whole, kind="parameters unsure").sentence(ROBOT)
-    assert unsure.startswith("run is explained much worse than the recordings fitted (parameters unsure): ")
+    assert unsure.startswith("run is explained much worse than the fitted recordings (parameters unsure): ")
 
 
 def test_of_very_many_events_the_strongest_are_said():

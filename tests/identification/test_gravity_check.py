@@ -56,7 +56,7 @@ def seen(robot: Robot, run: Recording) -> Observations:
         (DOWN, DOWN, None),
     ],
 )
-def test_another_gravity_is_told_of_an_arm_unlike_its_urdf(
+def test_another_gravity_is_reported_of_an_arm_unlike_its_urdf(
     tmp_path: Path, true: np.ndarray, stated: np.ndarray, said: str | None
 ) -> None:
     observations = seen(*made(tmp_path, true, stated))
@@ -66,7 +66,7 @@ def test_another_gravity_is_told_of_an_arm_unlike_its_urdf(
     assert found is None if said is None else said in str(found)
 
 
-def test_of_one_joint_neither_is_told(tmp_path: Path) -> None:
+def test_of_one_joint_neither_is_reported(tmp_path: Path) -> None:
     """The mass of a pendulum may lie on the other side of its axis as well."""
     observations = seen(*made(tmp_path, DOWN, UP, PLANAR_2R[:1]))
     assert "point along" not in str(gravity_said(observations))
@@ -79,7 +79,7 @@ def test_gravity_that_free_bodies_show_is_not_said_to_be_missing(tmp_path: Path)
     shown = urdf_gravity(observations)
     assert shown is not None
     small = replace(shown, found=0.05 * shown.stated, covariance=1e-6 * np.eye(3), inertia=1.0, inertia_std=0.01)
-    assert "does not show" in str(gravity_sentence(small))
+    assert "but no gravity" in str(gravity_sentence(small))
     observations.__dict__["_urdf_gravity"] = small
     assert gravity_said(observations) is None
 

@@ -59,7 +59,7 @@ def test_motions_are_taken_evenly_with_all_repetitions(robot: Robot, monkeypatch
     assert names(kept) == ["h1_1", "h3_1"]
     assert all(new is data.recordings[place] for new, place in zip(found.recordings, (2, 3, 6, 7, 10, 11), strict=True))
     assert note.startswith(
-        f"{16 * SAMPLES} samples of 2 joints are more than a diagnosis holds at once ({9 * SAMPLES})"
+        f"{16 * SAMPLES} samples of 2 joints are more than a diagnosis can hold at once ({9 * SAMPLES})"
     )
     assert "6 of 12 recordings and 2 of 4 recordings held out, evenly over all" in note
 
@@ -69,7 +69,7 @@ def test_of_one_motion_repetitions_are_taken_evenly(robot: Robot, monkeypatch: p
     hold(monkeypatch, 3.5)
     found, _, (note,) = held_at_once(data, PreparedData((), data.bands))
     assert names(found) == ["m_1", "m_4", "m_7"]
-    assert "looks at 3 of 9 recordings, evenly" in note
+    assert "uses 3 of 9 recordings, evenly" in note
 
 
 def test_parts_of_a_long_recording_are_taken_evenly(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -335,7 +335,7 @@ def test_bands_that_are_no_frequencies_are_refused(robot: Robot, clean: Recordin
         identify(robot, [clean], bands=bands)
 
 
-def test_what_steers_a_consistent_fit_is_told_beside_least_squares(robot: Robot):
+def test_what_steers_a_consistent_fit_is_reported_beside_least_squares(robot: Robot):
     """Of noise alone a consistent fit, held by what an arm can have, was said to be off by up to 19 std."""
     ur5 = load_robot(example_urdf("ur5_robot.urdf"))
     training = [ur5_run(ur5, seed, 0.002, 20) for seed in (0, 1)]

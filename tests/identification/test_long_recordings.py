@@ -116,7 +116,7 @@ def test_a_part_that_cannot_be_used_is_left_out_and_named(run, tmp_path, monkeyp
     found = identify(ROBOT, in_parts(monkeypatch, path), bands=BANDS)
     assert any("row 9001" in note and "left out, 1 of 4 parts" in note for note in found.notes)
     assert found.training.samples == 15_000 - 3_750
-    assert any("are of the 11250 samples" in note for note in found.notes)
+    assert any("are from the 11250 samples" in note for note in found.notes)
     useless = written(tmp_path, replace(run, name="useless", position=np.full_like(broken, np.inf)))
     with pytest.raises(RecordingError, match=r"useless\.parquet: joint1\.position is empty"):
         in_parts(monkeypatch, useless)

@@ -46,7 +46,7 @@ def seen(robot: Robot, recordings: list[Recording]) -> Observations:
 
 
 @pytest.mark.parametrize(("joints", "sign"), [((0,), 1.0), ((1,), 1.0), ((0, 1), 1.0), ((0,), -1.0)])
-def test_magnitudes_are_told_by_joint(robot: Robot, joints: tuple[int, ...], sign: float) -> None:
+def test_magnitudes_are_reported_by_joint(robot: Robot, joints: tuple[int, ...], sign: float) -> None:
     (fault,) = channel_faults(seen(robot, [unsigned(run, *joints, sign=sign) for run in runs(robot)]))
     assert fault.unsigned
     assert fault.joints == tuple(robot.joints[j] for j in joints)
@@ -81,7 +81,7 @@ def test_one_sign_of_a_load_is_no_magnitude(robot: Robot, load: float, monkeypat
             assert channel_faults(observations) == ()
 
 
-def test_magnitudes_are_told_where_they_leave_no_band(robot: Robot) -> None:
+def test_magnitudes_are_reported_where_they_leave_no_band(robot: Robot) -> None:
     """`identify` went on where no motion explained the torque at any frequency, at 0.6 Hz and with few rows."""
     wrong = [unsigned(run, 0) for run in runs(robot)]
     narrow = observe(build_model(robot, "basic"), prepare(wrong, (0.3, 0.3)))

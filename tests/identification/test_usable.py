@@ -45,8 +45,8 @@ def useless(robot: Robot) -> dict[str, Recording]:
     return {
         "no effort was recorded": replace(whole, effort=None),
         "no four samples in a row": cut(whole, slice(0, 3)),
-        "0 independent rows are left": replace(whole, position=still + noise),
-        "independent rows are left once the ends": cut(whole, part),
+        "0 independent rows remain": replace(whole, position=still + noise),
+        "independent rows remain once the ends": cut(whole, part),
     }
 
 
@@ -58,8 +58,8 @@ def cut(whole: Recording, part: slice) -> Recording:
 KINDS = (
     "no effort was recorded",
     "no four samples in a row",
-    "0 independent rows are left",
-    "independent rows are left once the ends",
+    "0 independent rows remain",
+    "independent rows remain once the ends",
 )
 
 
@@ -92,7 +92,7 @@ def test_bands_are_chosen_beside_a_useless_recording(robot: Robot, kind: str):
 
 
 def test_one_at_rest_is_seen_in_a_band_so_wide_that_positions_are_not_filtered(robot: Robot):
-    still = prepare([useless(robot)["0 independent rows are left"]], (40.0, 40.0))
+    still = prepare([useless(robot)["0 independent rows remain"]], (40.0, 40.0))
     assert kept_rows(still.recordings[0]) == 0
 
 
@@ -100,7 +100,7 @@ def test_without_any_of_use_there_is_an_error(robot: Robot):
     for kind in KINDS[:2]:
         with pytest.raises(RecordingError, match=kind):
             identify(robot, [useless(robot)[kind]], model="basic")
-    with pytest.raises(RecordingError, match="nothing is left of"):
+    with pytest.raises(RecordingError, match="none of 1200 samples can be used"):
         identify(robot, [useless(robot)[KINDS[2]]], model="basic")
 
 
@@ -214,7 +214,7 @@ def test_a_recording_that_holds_some_of_another_is_only_named(robot: Robot):
     kept, notes = without_copies([first, longer])
     assert kept == [first, longer]
     # Of 3000 windows those over the seam are nobody's.
-    assert notes == ["B_1: 19% of its samples are those of A_1, and count twice; give each once"]
+    assert notes == ["B_1: 19% of its samples are those of A_1, so these samples count twice; give each recording once"]
 
 
 def test_a_remark_on_many_recordings_is_one_line_with_the_numbers_of_the_first(robot: Robot):
@@ -246,5 +246,5 @@ def test_many_recordings_without_rows_are_left_out_in_one_line(robot: Robot):
     noise = 1e-5 * np.random.default_rng(0).standard_normal((5, *still.shape))
     many = [replace(moving(robot, f"still_{k}", 5 + k), position=still + noise[k]) for k in range(5)]
     found = identify(robot, [*many, moving(robot, "a_1", 1)], model="basic", bands=(4.0, 4.0))
-    (note,) = [note for note in found.notes if "independent rows are left" in note]
+    (note,) = [note for note in found.notes if "independent rows remain" in note]
     assert note.startswith("still_0 and 4 more recordings: 0 independent rows") and note.endswith("left out")

@@ -26,7 +26,7 @@ def told(faults: tuple[ChannelFault, ...]) -> list[dict[str, int]]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("quarters", [(0, 2, 0, 0), (0, -1, 1, 0)])
-def test_zeros_by_quarter_turns_are_told(quarters: tuple[int, ...]) -> None:
+def test_zeros_by_quarter_turns_are_reported(quarters: tuple[int, ...]) -> None:
     robot = arm()
     faults = channel_faults(seen(robot, runs(robot, quarters)))
     assert told(faults) == [{str(k + 2): turn for k, turn in enumerate(quarters) if turn}]
@@ -39,10 +39,10 @@ def test_what_leaves_as_much_is_named() -> None:
     (fault,) = channel_faults(seen(robot, runs(robot, (0, 0, 2, 0))))
     assert told((fault,)) == [{"4": 2}]
     assert fault.alternatives == ("effort and position of j2s6s200_joint_5 of opposite sign",)
-    assert "(as it does with effort and position of" in str(fault)
+    assert "(it does so too with effort and position of" in str(fault)
 
 
-def test_a_zero_nearly_a_quarter_turn_away_is_told_as_one() -> None:
+def test_a_zero_nearly_a_quarter_turn_away_is_reported_as_one() -> None:
     """The effect joint_zero finds the rest, with the line for it."""
     robot = arm()
     near = [
@@ -52,14 +52,14 @@ def test_a_zero_nearly_a_quarter_turn_away_is_told_as_one() -> None:
     assert told(channel_faults(seen(robot, near))) == [{"3": 1}]
 
 
-def test_no_zero_is_told_where_all_are_right_or_parameters_take_it_up() -> None:
+def test_no_zero_is_reported_where_all_are_right_or_parameters_take_it_up() -> None:
     robot = arm()
     for quarters in ((0, 0, 0, 0), (0, 0, 0, 1), (0, 0, 0, 2)):
         assert channel_faults(seen(robot, runs(robot, quarters))) == ()
 
 
 @pytest.mark.slow
-def test_no_zero_is_told_of_other_faults() -> None:
+def test_no_zero_is_reported_of_other_faults() -> None:
     robot = arm()
     spring = runs(robot, (0,) * 4, added=np.array([8.0, 8.0, 0.0, 0.0]))
     assert channel_faults(seen(robot, spring)) == ()
@@ -77,7 +77,7 @@ def test_an_arm_that_is_mounted_otherwise_has_no_zero_of_its_own(gravity: tuple[
 
 
 @pytest.mark.slow
-def test_the_line_that_is_told_mends_it(tmp_path: Path) -> None:
+def test_the_line_that_is_reported_mends_it(tmp_path: Path) -> None:
     """In degrees, beside an offset that is there already."""
     robot = arm()
     files = []
@@ -99,7 +99,7 @@ def test_the_line_that_is_told_mends_it(tmp_path: Path) -> None:
         return path
 
     wrong = load_robot(described())
-    line = r"offset: \{j2s6s200_joint_4: 1.57080\} in rad, or as much in the unit there"
+    line = r"offset: \{j2s6s200_joint_4: 1.57080\} in rad, or the same angle in the unit there"
     with pytest.raises(RecordingError, match=line) as caught:
         diagnose(wrong, read_recordings(files, wrong), model="basic")
     assert "\n" not in str(caught.value)

@@ -24,7 +24,7 @@ def left_of(spanning: np.ndarray, column: np.ndarray) -> float:
     return float(np.sum((column - spanning @ np.linalg.lstsq(spanning, column)[0]) ** 2))
 
 
-def test_rivals_are_apart_by_what_neither_does_for_the_other():
+def test_confounders_are_apart_by_what_neither_does_for_the_other():
     found = open_diagnosis()
     asked = questions(found)[:1]
     inquiry = replace(inquire(found, asked), known=None)
@@ -135,7 +135,7 @@ def test_a_file_and_the_recordings_give_the_same_inquiry():
         inquiry_of({"robot": "scara03"}, load_robot())
 
 
-def test_a_suspect_of_which_nothing_would_have_been_seen_is_not_told(monkeypatch: pytest.MonkeyPatch):
+def test_a_suspect_of_which_nothing_would_have_been_seen_is_not_reported(monkeypatch: pytest.MonkeyPatch):
     """Of a run in which one joint of six moves: a mean over no directions, which is no number."""
     monkeypatch.setattr(_View, "left", lambda *_: np.ones((4, 2)))
     view = _View(SimpleNamespace(just_seen={"it": np.zeros((2, 0))}), np.zeros((0, 0)), np.zeros((0, 0)))

@@ -132,7 +132,7 @@ def test_blocks_taken_together_hold_the_same_rows_and_more_are_of_other_trajecto
     assert np.sum(products[1].basis_products, axis=0) == pytest.approx(np.eye(PARAMETERS), abs=1e-9)
 
 
-def test_what_another_effect_does_nearly_as_well_is_not_told_from_it():
+def test_what_another_effect_does_nearly_as_well_is_not_distinguished_from_it():
     found = open_diagnosis()
     suspects = questions(found)[0].suspects
     asked = [Question("below_limit", item.label, (item,)) for item in suspects]

@@ -45,7 +45,7 @@ def test_a_recording_that_leaves_more_than_all_others_is_asked_for_once_more(rep
     found, run = diagnose(load_robot(), runs, bands=BANDS, catalogue=()), runs[-1]
     evidence = (found.evidence[0], replace(found.evidence[1], shown=False, by="", apart=run.name))
     first = next_steps(replace(found, evidence=evidence))[0]
-    assert first.question == f"what {run.name} alone has on joint2"
+    assert first.question == f"what only {run.name} has on joint2"
     assert ("find what was different" in first.motion, first.seconds is None) == (repeated, repeated)
     assert first.seconds is None or first.seconds == pytest.approx(np.ptp(run.time), rel=0.01)
 
@@ -93,7 +93,7 @@ def test_a_remainder_that_depends_on_a_signal_asks_for_a_motion_and_another_for_
     assert alone.motion == ASKED_MOTION
 
 
-def test_rivals_ask_for_a_motion_and_an_effect_for_the_experiment_that_shows_it():
+def test_confounders_ask_for_a_motion_and_an_effect_for_the_experiment_that_shows_it():
     first = next_steps(open_diagnosis())[0]
     entry = first.entry()
     assert {"question", "motion", "sigma_before", "sigma_after", "seconds"} <= entry.keys()

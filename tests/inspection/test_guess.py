@@ -14,7 +14,7 @@ from tests.made_recordings import save
 from tests.recording.files.formats import DEGREE, write_bag, write_mat
 
 
-def test_units_are_told_by_limits_and_slopes_where_no_name_says_them(tmp_path):
+def test_units_are_determined_by_limits_and_slopes_where_no_name_says_them(tmp_path):
     made = {"clock": 1e3 * MADE["time"]}
     for number, joint in enumerate(("joint1", "joint2")):
         made[f"J{number} angle"] = MADE[f"{joint}.position"] / DEGREE

@@ -49,7 +49,7 @@ def test_currents_on_an_arm_that_carries_its_weight_have_a_scale(tmp_path: Path)
     assert f"# note: {said}" in (found.description or "").splitlines()
 
 
-def test_an_opposite_sign_is_told(tmp_path: Path):
+def test_an_opposite_sign_is_reported(tmp_path: Path):
     urdf = write_urdf(tmp_path / "arm.urdf", PLANAR_2R)
     (said,) = scale(inspect_file(recorded(urdf, tmp_path, (1.0, -1.0)), urdf=urdf).notes)
     assert said.endswith("roughly -1 N m on j2: is effort_gain to be stated, negative where the sign is opposite?")
@@ -78,7 +78,7 @@ def test_torques_are_not_remarked_on(tmp_path: Path):
     assert scale(inspect_file(recorded(urdf, tmp_path, (1.0, 1.0)), urdf=urdf).notes) == []
 
 
-def test_what_noise_drowns_is_not_told(tmp_path: Path):
+def test_what_noise_drowns_is_not_determined(tmp_path: Path):
     light = [Link(axis=(0.0, 1.0, 0.0), mass=1e-3, com=(0.1, 0.0, 0.0), inertia=(1e-5, 1e-5, 1e-5))] * 2
     urdf = write_urdf(tmp_path / "arm.urdf", light)
     assert scale(inspect_file(recorded(urdf, tmp_path, (12.0, 12.0)), urdf=urdf).notes) == []
@@ -89,7 +89,7 @@ def test_behind_a_gear_the_side_comes_first(tmp_path: Path):
     assert scale(inspect_file(recorded(urdf, tmp_path, (12.0, 12.0)), urdf=urdf).notes) == []
 
 
-def test_the_ur10es_currents_are_told_within_a_third_of_the_published_gains():
+def test_the_ur10es_currents_are_determined_within_a_third_of_the_published_gains():
     place = shared_path("data", "ur10e")
     (said,) = scale(inspect_file(place / "ident_50s_12harm.parquet", urdf=place / "ur10e.urdf").notes)
     for joint, published in (("shoulder_lift_joint", 13.26), ("elbow_joint", 11.13), ("wrist_1_joint", 10.62)):

@@ -9,7 +9,7 @@ from scara_ident.robot.robot import load_robot
 ROBOT = load_robot()
 
 
-def test_named_columns_are_told_by_number_too_and_unnamed_ones_by_number_only():
+def test_named_columns_are_determined_by_number_too_and_unnamed_ones_by_number_only():
     names = ["joint1.position", "joint2.position", "enc[0]", "enc[1]", "joint1.effort"]
     found = groups("position", {name: meaning(name, ROBOT.joints) for name in names}, ROBOT.n)
     assert found == [

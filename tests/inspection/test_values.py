@@ -10,7 +10,7 @@ from tests.inspection.made import MADE
 
 
 @pytest.mark.parametrize(("unit", "factor"), [("s", 1.0), ("ms", 1e3), ("us", 1e6), ("ns", 1e9)])
-def test_a_clocks_unit_is_told_by_its_steps(unit, factor):
+def test_a_clocks_unit_is_determined_by_its_steps(unit, factor):
     assert time_unit(factor * MADE["time"] + 5 * factor) == unit
 
 

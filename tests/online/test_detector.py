@@ -28,7 +28,7 @@ def test_without_memory_the_threshold_is_chi_squared():
     np.testing.assert_allclose(threshold(4, 1.0, 1000.0), chdtri(4, 1e-3), rtol=2e-3)
 
 
-def test_white_scores_are_white_and_keep_out_what_is_not_told():
+def test_white_scores_are_white_and_keep_out_what_is_not_determined():
     random = np.random.default_rng(1)
     root = random.standard_normal((3, 3)) * np.array([[1.0], [30.0], [0.01]])
     drawn = root @ random.standard_normal((3, 20000))

@@ -195,7 +195,7 @@ def test_an_effect_whose_arithmetic_fails_is_an_error_of_a_line_where_asked_for_
     program = program_here(tmp_path)
     said = "pole of joint1, joint2 cannot be tried: its columns are not finite on any recording; correct the effect"
     done = program("diagnose", *runs, "--band", "11", "--effects", "spring,pole")
-    assert (done.returncode, done.stderr) == (1, f"scara-ident: effect {said} or do not ask for it\n")
+    assert (done.returncode, done.stderr) == (1, f"scara-ident: effect {said} or leave this effect out\n")
     done = program("diagnose", *runs, "--band", "11", "--json")
     assert (done.returncode, done.stderr) == (0, "")
     content = json.loads(done.stdout)

@@ -100,5 +100,5 @@ def test_two_files_of_one_name_in_a_folder_are_refused_by_both_names(tmp_path):
         (["/OJD_1.csv", "/x/OJD_1.csv", "/y/x/OJD_1.csv"], ("OJD_1", "x/OJD_1", "y/x/OJD_1")),
     ],
 )
-def test_recordings_of_one_name_are_told_by_their_folders(paths, names):
+def test_recordings_of_one_name_are_reported_by_their_folders(paths, names):
     assert distinct_names([Path(path) for path in paths]) == names

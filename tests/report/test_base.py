@@ -14,7 +14,7 @@ from scara_ident.robot.robot import load_robot
 from tests.arms import example_urdf
 
 
-def test_the_scara03_is_told():
+def test_the_scara03_is_reported():
     content = json.loads(json.dumps(plain(base_dict(load_robot())), allow_nan=False))
     assert (content["robot"], content["count"]) == ("scara03", 5)
     assert [row["name"] for row in content["base_parameters"]] == ["P_d1", "P_d2", "P_d3", "P_d4", "P_d5"]

@@ -22,8 +22,8 @@ def clean():
     return compare(ROBOT, exact_runs(3), bands=BANDS)
 
 
-def test_without_bias_none_is_told(clean):
-    assert comparison_sentences(clean)[1] == "No error exceeds twice what noise in the parameters explains."
+def test_without_bias_none_is_reported(clean):
+    assert comparison_sentences(clean)[1] == "No error exceeds twice the error that noise in the parameters explains."
 
 
 def test_the_weights_are_said(clean):
@@ -33,12 +33,12 @@ def test_the_weights_are_said(clean):
     assert plain == "Estimated by ols: every row of every joint counts the same."
 
 
-def test_bias_in_one_trajectory_is_told_from_noise():
+def test_bias_in_one_trajectory_is_distinguished_from_noise():
     runs = exact_runs(3)
     spoilt = with_torque(runs[:2], 1, lambda motion: 0.1 * motion.q[1])
     result = compare(ROBOT, [*spoilt, *runs[2:]], bands=BANDS)
     sentence = comparison_sentences(result)[1]
-    assert sentence.startswith("Bias, not noise, is at work where")
+    assert sentence.startswith("The error of the parameters from ")
     assert "A" in sentence.partition(" on ")[0]
     assert "joint2" in sentence
 
@@ -66,8 +66,8 @@ def test_a_fit_that_leaves_a_parameter_open_is_neither_best_nor_explained(clean)
     held = replace(best, trajectories=(*clean.trajectories[:2], left))
     found = comparison_sentences(held)
     assert "C" not in found[0]
-    assert found[1] == "No other error exceeds twice what noise in the parameters explains."
-    assert found[2].startswith("Parameters from C are not ranked: no standard deviation could be had of p_o2")
+    assert found[1] == "No other error exceeds twice the error that noise in the parameters explains."
+    assert found[2].startswith("Parameters from C are not ranked: no standard deviation is known for p_o2")
     assert "(-)" in text_of(*tables(comparison_dict(held)))
     assert "inf" not in text_of(*tables(comparison_dict(held)))
 

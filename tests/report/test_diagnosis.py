@@ -88,13 +88,13 @@ def test_without_repetitions_the_noise_floor_is_unknown_and_said_so():
     assert content["summary"][0].startswith("The model lacks nothing")
 
 
-def test_a_remainder_is_told_with_joint_signal_and_size():
+def test_a_remainder_is_reported_with_joint_signal_and_size():
     runs = with_torque(exact_runs(), 1, lambda motion: 0.03 * np.sin(5.0 * motion.q[1]))
     content = diagnosis_dict(diagnose(load_robot(), runs, bands=BANDS, catalogue=()))
     assert content["verdict"] == "unexplained"
     assert set(content["unexplained"]) == {"joint", "signals", "rms", "explained_share"}
     assert "depends on position of joint2" in content["summary"][-2]
-    assert content["summary"][-1].startswith("No recording tells a scale common to all torques and masses")
+    assert content["summary"][-1].startswith("Recordings cannot determine a common scale of all torques and masses")
     assert set(content["urdf_scale"]) <= {"joint1", "joint2"}
     stated = {row["name"]: row["urdf"] for row in content["parameters"]}
     assert stated["P_d1"] == pytest.approx(urdf_values(build_model(load_robot()))[0])

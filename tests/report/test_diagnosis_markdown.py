@@ -18,7 +18,7 @@ def test_the_story_has_both_tables_and_the_candidates_that_chance_does_not_expla
     assert text.startswith("# Diagnosis of scara03: explained\n")
     assert "## Error on the training recordings" in text
     assert "## Error on the validation recordings" in text
-    assert " % of the time is left out at its rests" in text
+    assert " % of the time, at rest, at reversals and" in text
     assert "### joint_elasticity on joint1\n" in diagnosis_markdown(result, [("joint_elasticity on joint1", "one.png")])
     content = diagnosis_dict(result)
     sure, by_chance = (

@@ -46,7 +46,7 @@ def test_where_the_effects_make_it_worse_it_is_said(result):
     off[-1] *= -4.0
     found = replace(result, after=replace(result.after, value=off))
     (said,) = (
-        words for words in sentences(found) if words.startswith("Worse with what was found than without: joint2 (")
+        words for words in sentences(found) if words.startswith("Worse with the effects than without them: joint2 (")
     )
     times = float(said.partition("(")[2].partition(" times")[0])
     before, after = (
@@ -77,7 +77,7 @@ def test_what_says_the_law_has_no_uncertainty():
     assert quantity("exponent", Parameter(1.0, 0.0, "1")) == "exponent 1"
 
 
-def test_where_it_cannot_be_told_the_first_sentence_says_so_then_what_to_do_and_why(result):
+def test_where_it_cannot_be_determined_the_first_sentence_says_so_then_what_to_do_and_why(result):
     unsure = replace(result.evidence[0], shown=False, by="", why="it is not white")
     undecided = replace(result, verdict="undecided", evidence=(unsure, result.evidence[1]), effects=())
     first, second, third, *_ = sentences(undecided)
@@ -91,24 +91,27 @@ def test_where_it_cannot_be_told_the_first_sentence_says_so_then_what_to_do_and_
     assert sentences(replace(undecided, evidence=both))[2] == "On joint1, joint2: 26% to 76% of it is not white."
     assert sentences(replace(undecided, evidence=both[:1]))[2] == "On joint1: 76% of it is not white."
     lacking = replace(undecided, evidence=(replace(unsure, lacks=True), result.evidence[1]))
-    assert sentences(lacking)[0] == "Undecided: something is missing, on joint1, that these recordings cannot name."
+    assert (
+        sentences(lacking)[0]
+        == "Undecided: something is missing on joint1, but these recordings cannot show what it is."
+    )
     assert diagnosis_dict(lacking)["evidence"]["joint1"]["lacks"] is True
     found, *_ = sentences(replace(undecided, effects=result.effects))
-    assert found == "Undecided: these recordings cannot tell whether something more is missing than was found."
+    assert found == "Undecided: these recordings cannot tell whether something else is missing too."
 
 
-def test_a_straight_friction_law_that_leaves_a_curve_is_told_what_to_try():
+def test_a_model_to_try_is_reported_where_a_straight_friction_law_leaves_a_curve():
     runs = with_torque(exact_runs(), 0, lambda motion: 0.05 * motion.v[0] ** 3)
     found = diagnose(load_robot(), runs, model="basic", bands=BANDS, catalogue=())
     words = " ".join(sentences(found))
     assert found.unexplained is not None
     assert found.unexplained.signals == (f"velocity of {found.unexplained.joint}",)
-    assert "straight in speed: try --model complete" in words
+    assert "linear in speed: try --model complete" in words
     cubic = " ".join(sentences(diagnose(load_robot(), runs, bands=BANDS, catalogue=())))
     assert "try --model" not in cubic
 
 
-def test_the_rotor_that_a_result_rests_on_is_told_where_nobody_stated_it(result):
+def test_the_rotor_that_a_result_rests_on_is_reported_where_nobody_stated_it(result):
     told = RotorInertia("joint1", 4.1, 1.02, False, 2.4, True)
     roughly = RotorInertia("joint1", 4.1, 1.5, False, 2.4, True)
     guessed = RotorInertia("joint2", 2.0, 2.9, False, 2.4, False)
@@ -116,12 +119,13 @@ def test_the_rotor_that_a_result_rests_on_is_told_where_nobody_stated_it(result)
     by_model = RotorInertia("joint2", 4.0, None, False, 2.4, True)
     words = sentences(replace(result, rotors=(told, roughly, guessed, stated, by_model)))
     assert [item for item in words if "rotor" in item] == [
-        "The rotor inertia of joint1 is not stated: guessed at 2.4 kg m^2 at the joint from the size of its motor, and "
-        "found to be 4.1 ± 0.08 kg m^2.",
-        "The rotor inertia of joint1 is not stated: guessed at 2.4 kg m^2 at the joint from the size of its motor, and "
-        "found to be 4.1 kg m^2 within a factor of 1.5.",
-        "The rotor inertia of joint2 is not stated and hardly shows: guessed at 2.4 kg m^2 at the joint from the size of "
-        "its motor, which may err by a factor of 3; what depends on it is as unsure as its ± says. State rotor_inertia.",
+        "The rotor inertia of joint1 is not stated: it was guessed as 2.4 kg m^2 at the joint from the size of the "
+        "motor and identified as 4.1 ± 0.08 kg m^2.",
+        "The rotor inertia of joint1 is not stated: it was guessed as 2.4 kg m^2 at the joint from the size of the "
+        "motor and identified as 4.1 kg m^2 within a factor of 1.5.",
+        "The rotor inertia of joint2 is not stated and the data hardly determine it: it was guessed as 2.4 kg m^2 at "
+        "the joint from the size of the motor, which may be wrong by a factor of 3; parameters that depend on it have "
+        "a large ±. State rotor_inertia.",
     ]
     (entry,) = diagnosis_dict(replace(result, rotors=(told,)))["rotors"]
     assert entry == {
@@ -130,18 +134,18 @@ def test_the_rotor_that_a_result_rests_on_is_told_where_nobody_stated_it(result)
     assert diagnosis_dict(result)["rotors"] == []
 
 
-def test_an_effect_that_is_there_and_whose_size_is_not_told_says_so(result):
+def test_an_effect_that_is_there_and_whose_size_is_not_determined_says_so(result):
     (effect,) = result.effects
     assert diagnosis_dict(result)["effects"][0]["size_determined"] is True
     unsure = replace(result, effects=(replace(effect, size_determined=False),))
-    said = f"it is there by what it removes (p = {effect.p_value:.1e}), but its size is not settled"
+    said = f"it is significant (p = {effect.p_value:.1e}), but its size is not determined"
     assert said in " ".join(sentences(unsure))
-    assert "not settled" not in " ".join(sentences(result))
+    assert "its size is not determined" not in " ".join(sentences(result))
     # What those held out speak against is not said to be there.
     against = HeldOutGain(-0.3, 0.1, 0.05, "joint2", 0.02, 0.03)
     doubted = " ".join(sentences(replace(result, effects=(replace(effect, size_determined=False, held_out=against),))))
     assert "In doubt: spring on joint2" in doubted
-    assert "not settled" not in doubted
+    assert "its size is not determined" not in doubted
     assert diagnosis_dict(unsure)["effects"][0]["size_determined"] is False
 
 
@@ -149,7 +153,7 @@ def test_the_verdict_comes_first_then_what_was_found_then_why_not_more_and_what_
     result,
 ):
     """The line of a report that stands out was that of an effect worth a look, above what is unexplained."""
-    guess = TentativeEffect("time_delay", None, "a delay", "could be chance", "two speeds", 0.01, 0.2, None)
+    guess = TentativeEffect("time_delay", None, "a delay", "may be chance", "two speeds", 0.01, 0.2, None)
     starts = {
         "undecided": ["Undecided", "Found spring", "To do first", "On joint1", "Rms error", "Worth a look"],
         "unexplained": ["Unexplained", "Found spring", "Rms error", "Worth a look"],
@@ -167,7 +171,7 @@ def test_the_verdict_comes_first_then_what_was_found_then_why_not_more_and_what_
 def test_where_what_is_left_depends_on_no_signal_it_is_said_what_to_do_first(result):
     left = replace(result, verdict="unexplained", unexplained=Unexplained("joint1", (), 0.1, 0.0))
     said = sentences(left)
-    place = next(k for k, words in enumerate(said) if words.endswith("no effect of the catalogue accounts for it."))
+    place = next(k for k, words in enumerate(said) if words.endswith("no effect of the catalogue explains it."))
     assert said[place + 1] == f"To do first: {next_steps(left)[0].within()}"
     shown = replace(left, unexplained=Unexplained("joint1", ("position of joint1",), 0.1, 0.5))
     assert not any(words.startswith("To do first") for words in sentences(shown))
@@ -189,11 +193,11 @@ def test_what_is_unexplained_is_said_to_go_as_an_effect_that_no_arm_has():
     runs = with_torque(exact_runs(), 0, lambda motion: -0.3 * motion.q[0])
     found = diagnose(load_robot(), runs, bands=BANDS, catalogue=(Spring(),))
     said = next(item for item in sentences(found) if item.startswith("Unexplained"))
-    assert "it goes as spring of joint1 does" in said
+    assert "it looks like spring of joint1" in said
     assert "it would push away from its rest position" in said
 
 
-def test_a_rival_of_its_own_name_is_told_from_it(result):
+def test_a_confounder_of_its_own_name_is_distinguished_from_it(result):
     """A payload of one recording could not be told, it said, from payload_change."""
     carried, taken_up, spring = PayloadOfRecordings(), FreePayloadChange(), Spring()
     rivals = tuple(
@@ -207,8 +211,8 @@ def test_a_rival_of_its_own_name_is_told_from_it(result):
         result.effects[0], effect=carried.name, joint=None, description="a payload in a", confounded_with=rivals
     )
     assert found.confounder_names(result.search.scene) == (
-        "payload_change (a payload of unknown mounting taken up or put down in the run)",
+        "payload_change (a payload at an unknown place, picked up or put down during a run)",
         "spring of joint2",
     )
     said = " ".join(sentences(replace(result, effects=(found,))))
-    assert "cannot tell it from: payload_change (a payload of unknown mounting" in said
+    assert "cannot distinguish it from: payload_change (a payload at an unknown place" in said

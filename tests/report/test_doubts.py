@@ -49,9 +49,9 @@ def test_gravity_that_points_elsewhere_stands_before_the_parameters(hanging: Ide
     assert parted(content) == ([doubt], content["summary"][1:])
     # Printed before the notes, some of which every result has.
     noted = replace(hanging, notes=("what every result has",))
-    assert in_order(noted.summary(), GRAVITY, "note: ", "meaning", "No recording tells a scale")
+    assert in_order(noted.summary(), GRAVITY, "note: ", "meaning", "Recordings cannot determine a common scale")
     identification_report(tmp_path / "report.html", IdentificationContext(hanging))
-    assert in_order((tmp_path / "report.html").read_text(), GRAVITY, "Fits its own recordings to within")
+    assert in_order((tmp_path / "report.html").read_text(), GRAVITY, "Fits the training recordings to within")
 
 
 def test_the_same_of_a_diagnosis(diagnosed: Diagnosis, tmp_path: Path):
@@ -77,12 +77,12 @@ def test_efforts_that_count_backwards_stand_there_too_and_nothing_is_said_of_bod
     assert in_order(result.summary(), "negate effort_gain", "meaning")
 
 
-def test_a_right_arm_is_not_in_doubt_and_its_scale_is_told_last(tmp_path: Path):
+def test_a_right_arm_is_not_in_doubt_and_its_scale_is_reported_last(tmp_path: Path):
     robot, run = made(tmp_path, DOWN, DOWN)
     result = identify(robot, [run], model="basic", bands=BANDS)
     first, others = headline_and_details(result)
     assert first == ()
-    assert others[-1].startswith("No recording tells a scale")
+    assert others[-1].startswith("Recordings cannot determine a common scale")
     assert identification_dict(result)["doubts"] == []
 
 
@@ -90,7 +90,7 @@ def test_bodies_of_the_opposite_sign_are_a_doubt_where_friction_does_not_brake_a
     robot, run = made(tmp_path, DOWN, DOWN)
     result = identify(robot, [run], model="basic", bands=BANDS)
     scale = scale_in_words(result.estimate, result.training)
-    assert "opposite sign" in scale and "though friction brakes there" in scale
+    assert "opposite sign" in scale and "but friction brakes there" in scale
     assert doubts(result.estimate, result.training, result.training, scale) == ()
     # Without friction nothing tells that efforts have the sign of the positions.
     robot, run = made(tmp_path, DOWN, DOWN, friction=0.0)

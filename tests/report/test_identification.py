@@ -84,13 +84,13 @@ def test_the_worst_held_out_run_is_named_in_words(result):
         for joint, error in zip(("joint1", "joint2"), result.validation_errors()["CI_1"], strict=True)
     )
     first = sentences(result)[0]
-    assert first.startswith(f"It generalises worst to CI_1, {worst[1]}: ")
+    assert first.startswith(f"The largest held-out error is on CI_1, {worst[1]}: ")
     assert f"{worst[0]:.1%} of the torque" in first
 
 
 def test_without_held_out_runs_that_is_said_instead():
     text = sentences(made([run("OJD_1", 1)]))
-    assert text[0].startswith("Nothing was held out")
+    assert text[0].startswith("There are no held-out recordings")
     assert text[1] == "Every parameter is determined."
 
 
@@ -100,14 +100,14 @@ def test_what_is_undetermined_is_named_and_null():
     open_ = [row["name"] for row in content["parameters"] if row["undetermined"]]
     assert {"P_d5", "a02", "a12", "a22", "a32", "p_o2"} <= set(open_)
     assert all((row["std"] is None) == row["undetermined"] for row in content["parameters"])
-    (said,) = [text for text in sentences(result) if "undetermined" in text]
+    (said,) = [text for text in sentences(result) if "do not determine" in text]
     assert all(name in said for name in open_)
     assert content["errors"]["training"]["OJD_1"]["joint2"]["rms"] is None
     assert (content["log_det"], content["condition"]) == (None, None)
     json.dumps(content, allow_nan=False)
 
 
-def test_what_is_not_told_from_zero_is_named(result):
+def test_what_is_not_distinguished_from_zero_is_named(result):
     small = [text for text in sentences(result) if text.startswith("Within two standard deviations of zero")]
     assert len(small) == 1
     assert "P_d3" in small[0] or "a31" in small[0] or "p_o1" in small[0]
@@ -122,20 +122,22 @@ def test_bodies_that_only_sums_tell_are_not_said_to_be_determined(result):
     covariance[place, place] = 1e6
     said = sentences(replace(result, estimate=replace(estimate, covariance=covariance)))
     assert "Every parameter is determined." not in said
-    (own,) = (text for text in said if "the torque determines sums with others" in text)
-    assert own.startswith("P_d5 is less sure than all bodies of the description together are large")
+    (own,) = (text for text in said if "only in sums with others" in text)
+    assert own.startswith("P_d5 is not determined alone")
 
 
 def test_where_no_standard_deviation_is_known_that_is_said(result):
     """Of a carriage pushed once a mass of 25.2 kg, with no standard deviation, was within two of zero."""
-    assert not [text for text in sentences(result) if text.startswith("How sure ")]
+    assert not [text for text in sentences(result) if text.startswith("The standard deviation of ")]
     estimate = result.estimate
     place = list(result.model.names).index("P_d1")
     covariance = estimate.covariance.copy()
     covariance[place, place] = np.inf
     lost = replace(result, estimate=replace(estimate, covariance=covariance))
-    (said,) = (text for text in sentences(lost) if text.startswith("How sure "))
-    assert said.startswith("How sure P_d1 is, is not known: one stretch of time tells it all but alone")
+    (said,) = (text for text in sentences(lost) if text.startswith("The standard deviation of "))
+    assert said.startswith(
+        "The standard deviation of P_d1 is not known: almost all information about it comes from one stretch"
+    )
     (small,) = (text for text in sentences(lost) if text.startswith("Within two standard deviations of zero"))
     assert "P_d1" not in small
 
@@ -172,7 +174,8 @@ def test_what_the_noise_of_positions_biases_is_said(result):
     )
     assert found["noise_bias"]["P_d1"] == 0.5
     assert (
-        "The noise of the positions biases P_d1 by about 0.5; their standard deviations hold that." in found["summary"]
+        "The noise of the positions biases P_d1 by about 0.5; their standard deviations include that bias."
+        in found["summary"]
     )
     alone = identification_dict(replace(result, estimate=replace(result.estimate, noise_bias=None)))
     assert alone["noise_bias"] == {}
@@ -185,12 +188,12 @@ def test_the_shape_of_friction_and_why_are_said():
     first, second = found.estimate.shapes
     assert content["friction_shape"]["joint1"] == {"shape": first.shape, "p_value": first.p_value, "why": first.why}
     assert content["summary"][-2] == (
-        f"Friction is lubricated (takes energy out, and grows ever less with speed) on joint1 (p = {first.p_value:.2g}), "
+        f"Friction is lubricated (dissipates energy, and grows less and less with speed) on joint1 (p = {first.p_value:.2g}), "
         f"joint2 (p = {second.p_value:.2g}): the data do not contradict it."
     )
     asked = made([run("OJD_1", 1)], method="consistent", options=ConsistentOptions(friction={"joint1": "free"}))
     said = [text for text in sentences(asked) if text.startswith("Friction is ")]
-    assert said[0] == "Friction is free (anything) on joint1: as asked for."
+    assert said[0] == "Friction is free (no constraint) on joint1: as asked for."
 
 
 def test_friction_that_pushes_is_named_where_no_parameter_of_its_own_is_below_zero(result):
@@ -212,11 +215,16 @@ def test_of_few_recordings_it_is_said_that_their_standard_deviations_hold_no_run
     """On five measured arms parameters of one recording each, or of half of one, lay 1.2 to 1.7 times as far apart as their stds say (rms)."""
     third = made([run("OJD_1", 1), run("OJD_2", 2), run("OJD_3", 3)], method="wls")
     one = made([run("OJD_1", 1)], method="wls")
-    few = [[said for said in sentences(each) if "is in no standard deviation" in said] for each in (one, result, third)]
+    few = [
+        [said for said in sentences(each) if "is not in the standard deviations" in said]
+        for each in (one, result, third)
+    ]
     assert few == [
-        ["How runs differ is not known from one recording, and is in no standard deviation: record three or more."],
         [
-            "How runs differ but for offsets is not known from two recordings, and is in no standard deviation: record three or more."
+            "How runs differ is not known from one recording and is not in the standard deviations: record three or more."
+        ],
+        [
+            "How runs differ, except for offsets, is not known from two recordings and is not in the standard deviations: record three or more."
         ],
         [],
     ]
@@ -228,7 +236,7 @@ def test_notes_are_handed_on(result):
 
 @pytest.mark.parametrize(
     ("stds", "said"),
-    [(-1.5, "chance may make up to 4 of one among so many"), (-6.0, "by more than chance"), (1.0, None)],
+    [(-1.5, "with so many parameters up to 4 may be chance"), (-6.0, "by more than chance"), (1.0, None)],
 )
 def test_what_cannot_be_negative_is_said_to_be_so_by_chance_or_not(result, stds: float, said: str | None):
     """Rotor inertias of a Panda of 6 standard deviations below zero were said to be of no real arm, and no more."""

@@ -22,8 +22,8 @@ def test_the_words_have_the_figures_of_the_json(result):
     assert content["left_out"]["validation"] == left_out_share(result.validation_after)
     told = {"left_out": {"training": {"j1": 0.112, "j2": 0.231}, "validation": {"j1": 0.2, "j2": 0.2}}}
     assert left_out_words(told) == (
-        "Errors are of the time in which a joint moves: 11 to 23 % of the time is left out at its rests and turns and at "
-        "the ends of recordings."
+        "Errors are for the time in which a joint moves: 11 to 23 % of the time, at rest, at reversals and at the ends "
+        "of recordings, is left out."
     )
     assert "moves: 20 % of" in left_out_words({"left_out": {"training": {"j1": 0.2, "j2": 0.2}, "validation": {}}})
     assert left_out_words({"left_out": {"training": {}, "validation": {}}}) == ""

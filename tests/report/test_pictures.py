@@ -60,7 +60,7 @@ def test_an_effect_is_drawn_before_and_after_and_stands_in_the_story(with_spring
 def test_a_remainder_is_drawn_over_what_it_depends_on(with_remainder, tmp_path):
     _, found = with_remainder
     (picture,) = diagnosis_pictures(DiagnosisContext(found))
-    assert (picture.title, picture.name) == ("What no effect accounts for on joint2", "unexplained.png")
+    assert (picture.title, picture.name) == ("What no effect explains on joint2", "unexplained.png")
     (tmp_path / picture.name).write_bytes(picture.content)
     assert share(tmp_path / "unexplained.png", "vermillion") > 2e-4
     diagnosis_report(tmp_path / "report.html", DiagnosisContext(found))

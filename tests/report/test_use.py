@@ -45,18 +45,21 @@ def test_the_json_holds_the_rms_of_every_feed_forward_and_only_rollouts_that_wer
 def test_the_words_give_shares_of_the_pids_error() -> None:
     first, *others = sentences(result())
     assert first == (
-        "Of the PID's tracking error 50% are left with the URDF fed forward, with the identified model 25%, "
-        "with the effects found 10%."
+        "The tracking error, relative to the PID alone, is 50% with the URDF fed forward, 25% with the identified "
+        "model and 10% with the effects found."
     )
-    assert "off after 0.2 s by joint1 0.01 rad, joint2 0.02 rad" in others[1]
+    assert "the position error after 0.2 s is joint1 0.01 rad, joint2 0.02 rad" in others[1]
     lost = replace(result(), rollouts={"identified": np.full((2, 2), np.inf)})
-    assert "gets lost" in sentences(lost)[1]
+    assert "diverges" in sentences(lost)[1]
     nowhere = sentences(replace(result(), rollouts={"identified": np.full((2, 2), np.nan)}))[1]
-    assert "in none do all joints move, with 0.5 s to come; give one in which they move at once" in nowhere
+    assert (
+        "has no moment at which all joints move and 0.5 s follow; give a recording in which all joints move at the same time"
+        in nowhere
+    )
     # What is not simulated is not among the effects that were.
-    assert others[1].startswith("Simulated with the effects found but drive_coupling the arm is off")
+    assert others[1].startswith("Simulated with the effects found but drive_coupling, the position error")
     assert others[-1] == "Not simulated: drive_coupling."
-    assert "with the effects found the arm" in " ".join(sentences(replace(result(), missing=())))
+    assert "with the effects found, the position error" in " ".join(sentences(replace(result(), missing=())))
     assert not any("harm" in words for words in others)
     assert total(np.array([3.0, 0.0]), np.array([3.0, 1.0])) == pytest.approx(np.sqrt(0.5))
 
@@ -68,7 +71,7 @@ def test_where_an_effect_fed_forward_makes_worse_it_is_said_of_the_joint() -> No
     worse = tuple(replace(item, error=item.error * ([[1.0], [6.0]] if item.name == "effects" else 1.0)) for item in run)
     said = sentences(replace(made, runs=(worse,)))[1]
     assert said == (
-        "Fed forward the effects do harm on joint2 (60% of the PID's error, without them 25%): leave them out there."
+        "In the feed-forward the effects do harm on joint2 (60% of the PID's error, without them 25%): leave them out there."
     )
     # 1.5 and 1.9 % are 2 % both: as a share of what is left a fourth more, and of the PID's error nothing.
     little = {"identified": 0.06, "effects": 0.076}
@@ -76,12 +79,12 @@ def test_where_an_effect_fed_forward_makes_worse_it_is_said_of_the_joint() -> No
     assert not any("harm" in words for words in sentences(replace(made, runs=(near,))))
     small = EffectWorth({"effect": "spring", "joint": "joint1"}, np.full(2, 2.0), np.full(2, 0.06))
     assert _cost_said(small, {"pid": np.full(2, 4.0), "effects": np.full(2, 0.076)}).endswith(
-        "spring of joint1: without it the PID alone would leave 50% of its error."
+        "spring of joint1: if the arm did not have it, the error of the PID alone would be 50% of its present value."
     )
     found = EffectWorth({"effect": "spring", "joint": "joint1"}, np.full(2, 2.0), np.full(2, 1.0))
     rms = {"pid": np.full(2, 4.0), "effects": np.full(2, 2.0)}
     assert _cost_said(found, rms).endswith(
-        "; with all effects fed forward 50% is left, with all but this one 25%: it does harm, so leave it out of what is fed forward."
+        "; with all effects in the feed-forward the error is 50% of that value, with all but this one 25%: it does harm, so leave it out of the feed-forward."
     )
     assert _cost_said(replace(found, not_fed=np.full(2, 1.9)), rms).endswith("all but this one 48%.")
 
@@ -92,9 +95,7 @@ def test_an_effect_in_doubt_is_said_to_be_fed_forward_all_the_same() -> None:
     (spring,) = made.model.found
     gain = HeldOutGain(-0.3, 0.1, 0.05, "joint1", 0.02, 0.03)
     doubted = replace(made.model, found=({**spring, "held_out": gain.entry()},))
-    said = (
-        "Spring of joint1 is in doubt: 10 ± 5 % of it shows on the recordings held out; it is in what is fed forward."
-    )
+    said = "Spring of joint1 is in doubt: 10 ± 5 % of it shows on the held-out recordings; it is in the feed-forward."
     assert said in sentences(replace(made, model=doubted))
 
 

@@ -53,6 +53,6 @@ def test_where_no_limit_tells_a_motor_the_links_do(tmp_path: Path):
     assert found.armature[1] == pytest.approx(1e4 * 1.5e-4 * 0.2**1.2)
 
 
-def test_what_is_stated_is_told_apart_from_what_is_not():
+def test_what_is_stated_is_distinguished_from_what_is_not():
     assert load_robot().rotor_stated.tolist() == [True, True]
     assert not np.any(load_robot("ur5").rotor_stated)

@@ -43,7 +43,7 @@ def test_a_tree_has_no_fault_and_one_more_joint_in_it_closes_a_loop(tree, data: 
 
 @settings(max_examples=30)
 @given(tree=trees(), data=st.data())
-def test_a_tree_cut_in_two_is_told(tree, data: st.DataObject):
+def test_a_tree_cut_in_two_is_reported(tree, data: st.DataObject):
     links, joints = tree
     lost = data.draw(st.sampled_from(joints))
     fault = urdf_fault(robot(links, [joint for joint in joints if joint != lost]))
@@ -67,11 +67,11 @@ def test_a_tree_cut_in_two_is_told(tree, data: st.DataObject):
         (["a", ""], [("j", "a", "")], "a link has no name"),
     ],
 )
-def test_a_fault_is_told_by_name(links: list[str], joints: list[tuple[str, str, str]], said: str):
+def test_a_fault_is_reported_by_name(links: list[str], joints: list[tuple[str, str, str]], said: str):
     assert (urdf_fault(robot(links, joints)) or "").startswith(said)
 
 
-def test_a_joint_without_a_child_is_told():
+def test_a_joint_without_a_child_is_reported():
     tree = ElementTree.fromstring('<robot><link name="a"/><joint name="j"><parent link="a"/><child/></joint></robot>')
     assert urdf_fault(tree) == "joint 'j' has no child link; name it"
 
@@ -126,7 +126,7 @@ def test_a_right_robot_has_no_fault_and_neither_have_those_of_makers():
         ('multiplier="0.5"', "joint 'j2': multiplier of <mimic>"),
     ],
 )
-def test_what_is_no_number_is_told_with_its_place(old: str, told: str, value: str):
+def test_what_is_no_number_is_reported_with_its_place(old: str, told: str, value: str):
     said = fault(old, f'{old.partition(chr(34))[0]}"{value}"')
     assert said == f"{told} is {value!r}; {NUMBER}"
 
@@ -156,5 +156,5 @@ def test_what_is_no_number_is_told_with_its_place(old: str, told: str, value: st
         ("<link", '<x:include xmlns:x="http://www.ros.org/wiki/xacro" filename="a"/><link', "it has <xacro:include>, so"),
     ],
 )  # fmt: skip
-def test_what_no_robot_has_is_told_with_what_to_do(old: str, new: str, said: str):
+def test_what_no_robot_has_is_reported_with_what_to_do(old: str, new: str, said: str):
     assert fault(old, new).startswith(said)

@@ -117,7 +117,7 @@ def test_of_two_runs_with_one_loaded_the_mass_takes_up_no_offset(tmp_path: Path,
 
 
 def test_an_offset_held_out_is_no_error_of_the_model(tmp_path: Path):
-    """`undecided`: "the error on the recordings held out is 3 times that of the training", all of it an offset as six runs may have."""
+    """`undecided`: "the error on the held-out recordings is 3 times the training error", all of it an offset as six runs may have."""
     robot = load_robot(write_urdf(tmp_path / "arm.urdf", PLANAR_2R))
     *runs, last = made(robot, 0.5, 5)
     held_out = replace(last, name="held_1", trajectory="held", repetition=1, effort=last.effort + 1.6)

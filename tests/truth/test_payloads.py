@@ -25,7 +25,7 @@ PAYLOAD = pin.Inertia(1.2, np.array([0.08, -0.05, 0.12]), np.diag([0.004, 0.003,
 
 
 @pytest.mark.slow
-def test_a_payload_is_found_by_torque_and_told_in_recordings_held_out():
+def test_a_payload_is_found_by_torque_and_reported_in_recordings_held_out():
     """Before, groups were tried by names and order, and a payload was a point mass: a loaded recording held out stayed off."""
     robot = ur5()
     carried = payload_torque(robot, PAYLOAD)
@@ -62,7 +62,7 @@ def test_a_payload_is_found_by_torque_and_told_in_recordings_held_out():
 
 
 @pytest.mark.slow
-def test_of_a_body_taken_up_in_the_run_all_is_told_that_shows():
+def test_of_a_body_taken_up_in_the_run_all_is_reported_that_shows():
     """Before, its inertia was no column, and what that left was `unexplained`."""
     robot = ur5()
     carried = payload_torque(robot, PAYLOAD)

@@ -29,7 +29,7 @@ def test_standard_deviations_cover_offsets_too():
     assert np.sum(inside[:, -2:], axis=0).min() >= 7
 
 
-def test_the_scatter_is_told_as_what_it_is_and_repetitions_are_seen_under_any_name():
+def test_the_scatter_is_reported_as_what_it_is_and_repetitions_are_seen_under_any_name():
     """Commit a6cf3ca: `complete`, "No trajectory was repeated", and not a word of runs that differ."""
     found = diagnose(load_robot(), coarse(1002))
     assert not found.effects

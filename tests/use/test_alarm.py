@@ -45,6 +45,6 @@ def test_too_little_is_one_line():
 
 def test_a_rate_higher_than_peaks_come_is_one_line():
     with pytest.raises(
-        RecordingError, match=r"n0: 7000 false alarms an hour are more than peaks .*; ask for .* or fewer"
+        RecordingError, match=r"n0: 7000 false alarms per hour are more than the peaks .*; give .* or fewer"
     ):
         calibrate([noise(0, 100.0)], 7000.0)

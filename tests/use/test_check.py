@@ -89,7 +89,7 @@ def test_peaks_are_within_what_is_stated_of_them_and_unsure_ones_are_named(rehea
     assert not any("no better than" in words for words in check_dict(found)["summary"])
     # Far from what was recorded on joint2, as where the loop rang.
     lost = check(replace(known, rms=known.rms * np.array([1.0, 100.0])), motions, joint_limits(known.robot))
-    (said,) = (words for words in check_dict(lost)["summary"] if "no better than a tenth" in words)
+    (said,) = (words for words in check_dict(lost)["summary"] if "uncertain by more than a tenth" in words)
     assert "joint2 (" in said and "joint1" not in said
 
 
@@ -120,7 +120,9 @@ def test_what_is_beyond_a_position_limit_cannot_be_run_slower_either(known: Iden
     motion = Motion("still", "still", time, zero + 0.5, zero, zero, None, 100.0)
     found = check(known, [motion], joint_limits(known.robot, ranges={"joint1": (-0.1, 0.2)}))
     assert found.speed_share is None
-    assert check_dict(found)["summary"][1].endswith("of the speed, where position of joint1 is still beyond its limit.")
+    assert check_dict(found)["summary"][1].endswith(
+        "of the speed it cannot be run: position of joint1 is still beyond its limit."
+    )
     free = joint_limits(known.robot)
     endless = np.full(2, np.inf)
     free = replace(free, lower=-endless, upper=endless, velocity=endless, torque=endless)
@@ -134,7 +136,7 @@ def test_what_keeps_a_motion_from_being_run_slowly_is_named_as_what_it_is(known:
     motion = Motion("slide", "slide", time, 0.1 * time + zero, zero + 0.1, zero, None, 100.0)
     found = check(known, [motion], joint_limits(known.robot, powers={"joint2": 1e-6}))
     said = check_dict(found)["summary"][1]
-    assert said == "Nor can it at 0.02 of the speed, where power of joint2 is still beyond its limit."
+    assert said == "Even at 0.02 of the speed it cannot be run: power of joint2 is still beyond its limit."
     assert "position" not in said and "gravity" not in said
 
 

@@ -71,7 +71,7 @@ def test_stated_forces_are_as_sure_as_they_say(observer: ContactObserver):
 
 
 @pytest.mark.slow
-def test_a_force_that_turns_in_the_arms_frame_is_told_in_the_bases(observer: ContactObserver):
+def test_a_force_that_turns_in_the_arms_frame_is_reported_in_the_bases(observer: ContactObserver):
     # The first joint turns by a quarter while it lasts; what the low-pass shows lags behind by an eighth of a radian.
     run = quiet(7)
     turning = replace(run, position=run.position + np.array([[1.5], *[[0.0]] * 5]) * run.time, velocity=None)
@@ -86,7 +86,7 @@ def test_a_force_that_turns_in_the_arms_frame_is_told_in_the_bases(observer: Con
     np.testing.assert_allclose(found.force, 2.0 * FORCE, atol=0.06 * 2.0 * np.linalg.norm(FORCE))
 
 
-def test_near_a_singular_pose_no_force_is_told(observer: ContactObserver):
+def test_near_a_singular_pose_no_force_is_reported(observer: ContactObserver):
     # Upright, with all axes but the first and the last but one parallel: what pushes down is not felt.
     held = moved_from(quiet(7), np.array([0.0, -np.pi / 2, 0.0, -np.pi / 2, 0.0, 0.0]), 1e-2)
     contacts = look_for_contact(observer, [pushed(held, 4.0 * FORCE, 8.0, 9.0)]).contacts

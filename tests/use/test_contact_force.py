@@ -38,7 +38,7 @@ def test_a_force_on_the_tool_is_placed_there(observer: ContactObserver):
 
 
 @pytest.mark.slow
-def test_a_force_beside_the_tool_is_told_with_its_point(observer: ContactObserver):
+def test_a_force_beside_the_tool_is_reported_with_its_point(observer: ContactObserver):
     # As if on the tool it would be too small, or turned.
     rng, placed = np.random.default_rng(1), 0
     turn, origin = tool_placement(ur5())
@@ -66,6 +66,6 @@ def test_the_entry_has_the_point(observer: ContactObserver):
     assert len(entry["force"]) == 3
 
 
-def test_what_does_not_load_the_last_joint_is_told_no_force_beside_the_tool(observer: ContactObserver):
+def test_no_force_beside_the_tool_is_reported_where_the_last_joint_is_not_loaded(observer: ContactObserver):
     found = contact(observer, 8, 2.0 * FORCE, joints=4)
     assert (found.place, found.force, found.estimate.point) == ("wrist_1_link", None, None)

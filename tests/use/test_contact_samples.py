@@ -46,7 +46,7 @@ def off(found: Contact, force: np.ndarray) -> float:
 @pytest.mark.slow
 @pytest.mark.parametrize("made", [quiet, turning])
 @pytest.mark.parametrize("lasting", [0.3, 1.0])
-def test_a_strong_force_is_told_as_well_as_the_torque_without_it(observers, made, lasting: float):
+def test_a_strong_force_is_determined_as_well_as_the_torque_without_it(observers, made, lasting: float):
     # A direction that is told 40 times worse than another, of seeds 21 and 23, is no reason to place it elsewhere.
     errors, z = [], []
     for seed in range(20, 26):
@@ -60,7 +60,7 @@ def test_a_strong_force_is_told_as_well_as_the_torque_without_it(observers, made
 
 
 @pytest.mark.slow
-def test_a_force_that_rises_and_falls_is_told_where_it_is_whole(observers):
+def test_a_force_that_rises_and_falls_is_reported_where_it_is_whole(observers):
     # In steps of 20 ms to all of it and back, which is a push that nobody taps: 60 ms each.
     run = quiet(21)
     for first, last in ((8.0, 9.0), (8.02, 8.98), (8.04, 8.96), (8.06, 8.94)):
@@ -69,7 +69,7 @@ def test_a_force_that_rises_and_falls_is_told_where_it_is_whole(observers):
 
 
 @pytest.mark.slow
-def test_one_too_short_to_be_whole_is_told_still(observers):
+def test_one_too_short_to_be_whole_is_reported_still(observers):
     found = told(observers["quiet"], pushed(quiet(21), FORCE, 8.0, 8.05))
     assert found.force is not None
     # A share of it, in its direction.

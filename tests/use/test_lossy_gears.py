@@ -34,7 +34,7 @@ def lossy(known: IdentifiedModel, order: int, spring: float = 0.0) -> tuple[Effe
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("order", "spring"), [(1, 0.0), (2, 0.0), (2, 0.03)])
-def test_a_contact_is_told_as_it_is_though_the_gear_loses_a_share_of_it_too(
+def test_a_contact_is_reported_as_it_is_though_the_gear_loses_a_share_of_it_too(
     known: IdentifiedModel, order: int, spring: float
 ):
     term, model = lossy(known, order, spring)

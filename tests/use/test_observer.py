@@ -63,7 +63,7 @@ def test_lost_samples_and_gaps_are_no_contact(observer: ContactObserver):
     [
         ({"q": np.zeros(5)}, r"q has the shape \(5,\); expected \(6,\), one number for each joint of ur5"),
         ({"effort": np.zeros((6, 1))}, "effort has the shape"),
-        ({"v": None}, "v is None; .* give them"),
+        ({"v": None}, "v is None, .* give velocities"),
         ({"step": 0.0}, "step is 0 s; expected"),
         ({"step": np.nan}, "step is nan s; expected"),
     ],

@@ -89,6 +89,6 @@ def test_an_arm_that_cannot_be_held_is_said_with_its_lightest_joint() -> None:
     wild = replace(arm, controller=replace(arm.controller, derivative=-1e9 * np.ones(2)))
     wild = replace(wild, robot=replace(arm.robot, effort_limit=np.full(2, np.inf)), rotor_inertia=np.array([1e-3, 0.0]))
     with pytest.raises(
-        LostArm, match=r"^trial: .*: joint2 has an inertia of .* next to nothing of it its rotor's, .*excite"
+        LostArm, match=r"^trial: .*: joint2 has a mean inertia of .* the rotor has almost nothing, .*excite"
     ):
         tracked(wild, (), at_ticks(trial_motion(arm)), {"pid": None})

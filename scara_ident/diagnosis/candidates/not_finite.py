@@ -44,7 +44,7 @@ def without_not_finite(
         place = listed(list(recordings), MAX_NAMED) if some else "any recording"
         mend = ["correct the effect", *([f"leave out {place}"] if some else [])]
         if wholly and asked_for:
-            mend.append("do not ask for it")
+            mend.append("leave this effect out")
         what = "cannot be tried" if wholly else "cannot be tried with some values of its parameters"
         said = f"{label} {what}: its columns are not finite on {place}; {', '.join(mend[:-1])}{' or ' * (len(mend) > 1)}{mend[-1]}"
         if wholly and asked_for:

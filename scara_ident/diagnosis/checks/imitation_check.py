@@ -27,7 +27,7 @@ def imitation_objection(step: SelectionStep, decision: Decision) -> str | None:
     """
     for other, share in _imitating(step, decision):
         what = other.effect.description(step.scene, other.member)
-        return f"{what} does as well in its place, and beside it {max(share, 0.0):.0%} of this is left"
+        return f"{what} explains as much in its place, and with it in the model {max(share, 0.0):.0%} of this effect is left"
     return None
 
 

@@ -66,17 +66,18 @@ def made_by_noise(step: SelectionStep, decision: Decision) -> str | None:
         return None
     p_value = _left_of(found, left).p_value
     if share < criteria.min_without_noise:
-        return f"{BY_NOISE} makes it: with that taken off {share:.0%} of it is left, p = {p_value:.1e}"
+        return f"{BY_NOISE} causes it: without that noise {share:.0%} of it is left, p = {p_value:.1e}"
     # Believed as it is, it may pass what is asked by little, so that most of it need not pass. Of a correction less is asked.
     if decision.gain * share < criteria.min_gain <= decision.gain:
         return (
-            f"{BY_NOISE} helps it over the detection limit: with that taken off, {share:.1%} of it is left, which "
-            f"removes {decision.gain * share:.2%} of the squared residual, {criteria.min_gain:.0%} is asked"
+            f"{BY_NOISE} lifts it above the detection limit: without that noise {share:.1%} of it is left, which "
+            f"removes {decision.gain * share:.2%} of the squared residual, {criteria.min_gain:.0%} is required"
         )
     if p_value * step.tried > criteria.family_error:
         return (
-            f"{BY_NOISE} makes it surer than it is: with that taken off, {share:.1%} of it is left, p = {p_value:.1e} "
-            f"instead of {found.p_value:.1e}; of one of {step.tried} candidates tried {criteria.family_error / step.tried:.1e} is asked"
+            f"{BY_NOISE} makes it look more significant than it is: without that noise {share:.1%} of it is left, p = "
+            f"{p_value:.1e} instead of {found.p_value:.1e}; with {step.tried} candidates tried "
+            f"{criteria.family_error / step.tried:.1e} is required"
         )
     return None
 
@@ -90,19 +91,19 @@ def within_a_step(step: SelectionStep, candidate: Candidate) -> str | None:
     data, unit = step.observations.data, step.scene.robot.position_unit(joint)
     steps = max((part[joint][0] or 0.0 for parts in noise_sizes(data) for part in parts), default=0.0)
     if way < steps:
-        return f"it turns on {way:.2g} {unit}, less than a step of the encoder, {steps:.2g} {unit}"
+        return f"it depends on {way:.2g} {unit} of motion, less than a step of the encoder, {steps:.2g} {unit}"
     changes = np.concatenate([_changes_at_turns(part.motion.v[joint]) for part in data.stretches])
     passed = float(np.sqrt(np.mean(changes**2))) if len(changes) else 0.0
     if speed < passed:
         return (
-            f"friction would be another one below {speed:.2g} {unit}/s, which the joint passes within a sample as it turns: "
-            f"from one to the next it gains {passed:.2g} {unit}/s"
+            f"friction would differ only below {speed:.2g} {unit}/s, and a reversing joint passes that speed within "
+            f"one sample: its speed changes by {passed:.2g} {unit}/s per sample"
         )
     stepping = max(float(stepping_speeds(part.stretch, part.motion.cuts)[joint]) for part in data.stretches)
     if speed < STEPS_OF_SPEED * stepping:
         return (
-            f"friction would be another one below {speed:.2g} {unit}/s, where a controller that answers the encoder's steps shakes the joint: "
-            f"below {stepping:.2g} {unit}/s these come one by one"
+            f"friction would differ only below {speed:.2g} {unit}/s, where the controller's reaction to the encoder's "
+            f"steps shakes the joint: below {stepping:.2g} {unit}/s the steps come one by one"
         )
     return None
 
@@ -137,7 +138,7 @@ def _gone_further_down(step: SelectionStep, decision: Decision) -> str | None:
     name, unit = candidate.effect.coefficients[0].name, candidate.effect.coefficients[0].unit
     return (
         f"{name} would be {whole.value[0]:.2g} {unit}, but {found.value[0]:.2g} {unit} below {band:.2g} Hz "
-        f"(p = {p_value:.1e}), where one that is there is the same"
+        f"(p = {p_value:.1e}); a real one would have the same value there"
     )
 
 
@@ -170,8 +171,8 @@ def made_through_the_controller(step: SelectionStep, decision: Decision) -> str 
         # Noise in the column alone makes the whole band's too small.
         if left <= 1.0 - criteria.lower_change and p_value <= criteria.significant:
             return (
-                f"{BY_NOISE} could make all of it, by what a controller answers it with: below "
-                f"{band:.2g} Hz it is {left:.0%} of its size (p = {p_value:.1e}), where one that is there is the same"
+                f"{BY_NOISE} could cause all of it through the controller's reaction: below {band:.2g} Hz it has "
+                f"{left:.0%} of its size (p = {p_value:.1e}); a real one would have the same value there"
             )
     return None
 

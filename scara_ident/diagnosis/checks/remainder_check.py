@@ -40,6 +40,10 @@ def remainder_objection(step: SelectionStep, decision: Decision) -> str | None:
         return None
     what = step.rest.effect.description(step.scene, step.rest.member)
     if instead and not kept:
-        return f"{what} does as well in its place, and beside it {max(share, 0.0):.0%} of this is left"
+        return f"{what} explains as much in its place, and with it in the model {max(share, 0.0):.0%} of this effect is left"
     (again,) = both.without(len(rest.chosen)).judge(both.chosen[-1:])
-    return None if again.accepted else f"beside {what} {max(share, 0.0):.0%} of this is left: {again.why}"
+    return (
+        None
+        if again.accepted
+        else f"with {what} in the model, {max(share, 0.0):.0%} of this effect is left: {again.why}"
+    )

@@ -14,7 +14,7 @@ from scara_ident.motion.prepared import PreparedData
 from scara_ident.recording.audit.position import is_computed
 
 # A simulator may record positions that are as exact, beside efforts with noise.
-OR_ELSE = "; positions are smoother than any encoder's, and should they be setpoints, it is what the controller lags by"
+OR_ELSE = "; the positions are smoother than any encoder's: if they are setpoints, this is the lag of the controller"
 
 
 def setpoint_objection(step: SelectionStep, decision: Decision) -> str | None:
@@ -31,8 +31,8 @@ def setpoint_objection(step: SelectionStep, decision: Decision) -> str | None:
     if not may_be_setpoints(data, effect, member) or not _in_steps(data, member.place):
         return None
     return (
-        "positions without noise or steps beside efforts in steps look like setpoints, and what a controller lags by looks like "
-        "this: log the measured positions"
+        "the positions have neither noise nor steps but the efforts have steps, so the positions look like setpoints, "
+        "and the lag of a controller looks like this effect: log the measured positions"
     )
 
 

@@ -57,15 +57,15 @@ def variation_objection(step: SelectionStep, decision: Decision, min_gain: float
     # Whether it leaves little but noise is seen where what runs differ by takes no part in it.
     if step.in_doubt(again, max(gain, decision.gain)):
         again = examine_rows(beside.model, rows[0], again)
-    why = "runs differ from one another by as much: with that counted as noise"
+    why = "runs differ from one another by as much: with these differences counted as noise"
     if len(step.observations.data.recordings) < MIN_RUNS:
-        scale = f"all torque by {ASSUMED_SCALE:.0%}, " if decision.candidate.effect.by_recording else ""
-        each = f"friction by some {ASSUMED_FRICTION:.0%}, {scale}an offset by {ASSUMED_OFFSET:.0%} of its torque, a delay by "
-        why = f"{each}{ASSUMED_DELAY * 1e3:g} ms: runs that differ so may do as much: with that counted as noise"
+        scale = f"{ASSUMED_SCALE:.0%} in torque scale, " if decision.candidate.effect.by_recording else ""
+        each = f"runs may differ by {ASSUMED_FRICTION:.0%} in friction, {scale}{ASSUMED_OFFSET:.0%} of the torque in offset, "
+        why = f"{each}{ASSUMED_DELAY * 1e3:g} ms in delay, which may look the same: with these differences counted as noise"
     if again.p_value * step.tried > step.criteria.family_error:
         return f"{why} p = {again.p_value:.1e}"
     if gain < min_gain and not _dwarfs(step, decision, variation):
-        return f"{why} it removes {max(gain, 0.0):.1%} of the squared residual, {min_gain:.0%} is asked"
+        return f"{why} it removes {max(gain, 0.0):.1%} of the squared residual, {min_gain:.0%} is required"
     return None
 
 
@@ -76,13 +76,13 @@ def _alike(step: SelectionStep, decision: Decision) -> str | None:
     shared = variation.delays
     if shared is None or not shared.differ:
         chance = "" if shared is None else f" (p = {shared.p_value:.1e})"
-        return f"that recordings differ in it may be chance, by how the joints disagree{chance}"
+        return f"the difference between recordings may be chance, because the joints disagree about it{chance}"
     try:
         beside = correction_step(step, decision.candidate)
     except RecordingError as error:
-        return f"the lower part of the band does not tell it: {error}"
+        return f"the lower part of the band does not determine it: {error}"
     (again,) = beside.judge([decision.candidate])
-    return None if again.accepted else f"with what else runs differ by counted as noise, {again.why}"
+    return None if again.accepted else f"with the other differences between runs counted as noise, {again.why}"
 
 
 def _dwarfs(step: SelectionStep, decision: Decision, variation: RunVariation) -> bool:

@@ -100,7 +100,7 @@ def evidence(
         less = coloured_shares(residuals, made())
         # What is white is shown as it is, whatever other joints need.
         mended = (coloured > criteria.min_colour) & (less < coloured)
-        noise[mended], coloured[mended] = "white noise and that of the positions", less[mended]
+        noise[mended], coloured[mended] = "white noise and the noise of the positions", less[mended]
     repeated = {item.joint: item for item in fit}
     # An effect found leaves something of second order, which repeats as it does.
     times = criteria.far_above_noise if found.chosen or found.correction is not None else 0.0
@@ -149,17 +149,17 @@ def _of_joint(
     repeats = fit is not None and fit.p_value < criteria.significant
     if limit > criteria.min_power:
         missing = (
-            "nothing missing"
+            "no missing effect"
             if round(limit, 2) >= 1.0
-            else f"nothing missing that makes less than {limit:.0%} of the squared residual"
+            else f"no missing effect that makes less than {limit:.0%} of the squared residual"
         )
         why = f"{missing} would have been significant: record more"
         return Evidence(joint, False, "", why, limit)
     if fit is not None and repeats and fit.missing > small:
-        why = f"{_beside(fit, unit)}: more than filters and encoders alone leave, and no effect that was tried explains it"
+        why = f"{_beside(fit, unit)}; this is more than filters and encoders cause, and no effect that was tried explains it"
         return Evidence(joint, False, "repetition", why, limit)
     if fit is not None and fit.max_missing <= criteria.remainder_to_noise * fit.noise:
-        why = f"repetitions leave at most {fit.max_missing:.3g} {unit} that repeats, and {fit.noise:.3g} {unit} that does not"
+        why = f"by the repetitions at most {fit.max_missing:.3g} {unit} repeats, and {fit.noise:.3g} {unit} does not"
         return Evidence(joint, True, "repetition", why, limit)
     # What is that large beside the noise is doubted where it is hardly shown too, as of a few periods of a narrow band.
     far = fit is not None and fit.p_value < DOUBTED and fit.missing > criteria.far_above_noise * fit.noise
@@ -169,17 +169,17 @@ def _of_joint(
         and fit.missing > max(of_effects * fit.noise, max(1.0, of_effects) * of_positions)
     ):
         # A ripple at many speeds is as white as noise, and repeats.
-        why = f"{_beside(fit, unit)}: no noise, even where it is white, but filters and encoders may leave as much, "
+        why = f"{_beside(fit, unit)}; this is not noise, even if it is white, but filters and encoders may cause as much, "
         why += "so this alone does not say that the model lacks something"
         return Evidence(joint, False, "repetition", why, limit)
     if coloured <= criteria.min_colour:
-        why = f"at most {max(coloured, 0.0):.0%} of its power stands out from {noise} within the band"
+        why = f"at most {max(coloured, 0.0):.0%} of the residual's power within the band is above {noise}"
         return Evidence(joint, True, "whiteness", why, limit)
-    why = f"{coloured:.0%} of its power stands out from {noise} within the band, and "
+    why = f"{coloured:.0%} of the residual's power within the band is above {noise}, and "
     why += (
-        "no trajectory is repeated that would tell whether it repeats"
+        "no trajectory was repeated, so whether it repeats is not known"
         if fit is None
-        else f"up to {fit.max_missing:.3g} {unit} of it may repeat, where {fit.noise:.3g} {unit} does not"
+        else f"up to {fit.max_missing:.3g} {unit} of it may repeat, and {fit.noise:.3g} {unit} does not"
     )
     return Evidence(joint, False, "", why, limit)
 
@@ -187,7 +187,7 @@ def _of_joint(
 def _beside(fit: LackOfFit, unit: str) -> str:
     """Say what repeats beside what does not."""
     chance = f"p = {fit.p_value:.1e}"
-    return f"{fit.missing:.3g} {unit} repeats from run to run ({chance}) beside {fit.noise:.3g} {unit} that does not"
+    return f"{fit.missing:.3g} {unit} repeats from run to run ({chance}), {fit.noise:.3g} {unit} does not"
 
 
 def held_out_evidence(
@@ -212,13 +212,17 @@ def held_out_evidence(
     found = []
     for item, own, other, known, apart in zip(shown, training, held_out, unsure, differing, strict=True):
         if item.shown and own and other is not None and other > criteria.worse_held_out * own:
-            why = f"the error on the recordings held out is {other / own:.2g} times that of the training"
+            why = f"the error on the held-out recordings is {other / own:.2g} times the training error"
             # The few draws of a run are known by their standard deviation alone.
             most = np.linalg.norm([criteria.worse_held_out * own, known, criteria.alike * apart])
             if other > most:
                 item = replace(item, shown=False, by="", why=why)
             else:
-                by = "as unsure as the parameters are there" if known >= apart else "as runs were found to differ"
+                by = (
+                    "which the uncertainty of the parameters there explains"
+                    if known >= apart
+                    else "which the differences between runs explain"
+                )
                 item = replace(item, why=f"{item.why}; {why}, {by}")
         found.append(item)
     return tuple(found)

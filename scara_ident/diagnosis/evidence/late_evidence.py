@@ -41,7 +41,7 @@ def late_evidence(
             made = float(np.sum((late * own.directions[KINDS.index("delay")]) ** 2))
             rest = float(np.sum((rows.left(after.value) - own.off) ** 2))
             if made > criteria.min_gain * (made + rest):
-                why = f"it {late_words(own, late)} in all runs alike, and no effect stands for that"
+                why = f"it {late_words(own, late)} in all runs, and no effect in the model explains that"
                 item = replace(item, shown=False, by="", why=why)
         found.append(item)
     return tuple(found)

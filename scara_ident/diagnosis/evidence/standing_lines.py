@@ -56,12 +56,12 @@ class StandingLine:
 
     def sentence(self, unit: str, band: float | None) -> str:
         """Say what it is, and what to do."""
-        what = f"a line of {self.amplitude:.3g} {unit} at {self.frequency:.4g} Hz, which is no noise"
+        what = f"a spectral line of {self.amplitude:.3g} {unit} at {self.frequency:.4g} Hz, which is not noise,"
         if self.within or band is None:
-            return f"{min(1.0, self.share):.0%} of its power is {what} and has no phase that all recordings share"
-        return (
-            f"above the band of {band:.3g} Hz there is {what}, larger than all that is left within: give a wider band"
-        )
+            return (
+                f"{min(1.0, self.share):.0%} of the residual's power is {what} and has another phase in each recording"
+            )
+        return f"above the band of {band:.3g} Hz there is {what} and is larger than all that is left within the band: give a wider band"
 
 
 def standing_lines(residuals: Residuals, criteria: SelectionCriteria = CRITERIA) -> tuple[StandingLine | None, ...]:

@@ -52,7 +52,12 @@ def steady_evidence(
                 share = 1.0 - float(np.sum((rest - item.off) ** 2)) / float(np.sum(rest**2))
                 worst[joint] = max(worst[joint], (share, _said(item, robot, joint)))
     return tuple(
-        replace(item, shown=False, by="", why=f"{share:.0%} of its power changes within recordings as if its {what}")
+        replace(
+            item,
+            shown=False,
+            by="",
+            why=f"{share:.0%} of the residual's power varies within recordings as if its {what}",
+        )
         if item.shown and share > criteria.min_colour
         else item
         for item, (share, what) in zip(shown, worst, strict=True)
@@ -80,4 +85,4 @@ def _said(item: JointVariation, robot: Robot, joint: int) -> str:
         f"{size:.2g} {robot.torque_unit(joint)}",
         f"{1e3 * size:.2g} ms",
     )
-    return f"{KINDS[place]} changed (standard deviation {units[place]}), another way in each"
+    return f"{KINDS[place]} changed during each recording (standard deviation {units[place]}), differently in each"

@@ -61,7 +61,7 @@ def own_correction(
     notes = [
         f"{name}: {column.name} {x:.3g} {column.unit} by its first third"
         if name in own
-        else f"{name}: its first third is too short to show its {column.name}, which is taken for the mean of the others"
+        else f"{name}: its first third is too short to determine its {column.name}; the mean of the others is used"
         for name, x in zip(names, value, strict=True)
     ]
     return Correction(candidate, value, names), notes

@@ -129,7 +129,7 @@ def spoken_against(
 ) -> tuple[Evidence, ...]:
     """Take back that a residual is noise on a joint where the recordings held out speak against an effect found."""
     why = {
-        item.joint: f"{shown_of(item, label)} on the recordings held out"
+        item.joint: f"{shown_of(item, label)} on the held-out recordings"
         for label, item in gains.items()
         if item.against(criteria)
     }

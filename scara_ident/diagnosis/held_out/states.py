@@ -103,7 +103,7 @@ def _by_recording(found: Search, after: Estimate, data: PreparedData, optional: 
         notes.append(f"{name}: its first third {shown if name in seen else 'is too short to show which effects act'}")
     rest, useless = with_rows(prepare([rest for _, rest in parted], data.bands), scene.robot, needed=False)
     scene = moved_with(scene, found.chosen, chosen)
-    notes += ["errors held out are of the other two thirds", *useless]
+    notes += ["held-out errors are of the other two thirds", *useless]
     return HeldOut(rest, scene, tuple(chosen), tuple(notes), correction)
 
 
@@ -117,8 +117,8 @@ def _in_intervals(found: Search, value: Array, weights: Array, held: HeldOut, ti
                 apart, seen = intervals_by_others(one, held.scene, held.chosen, k, value, weights)
                 chosen[k] = replace(item, member=replace(item.member, intervals=(*item.member.intervals, *apart)))
                 notes.append(
-                    f"{one.name}: {item.effect.name} acts {words_of(seen)}; each joint is predicted with the intervals that the "
-                    "torque of the others tells"
+                    f"{one.name}: {item.effect.name} acts {words_of(seen)}; each joint is predicted with the intervals "
+                    f"that the torque of the other joints gives"
                 )
     scene = moved_with(held.scene, held.chosen, chosen)
     return replace(held, scene=scene, chosen=tuple(chosen), notes=tuple(notes))

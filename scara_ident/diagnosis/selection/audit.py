@@ -86,14 +86,14 @@ def _moved_by_noise(own: Coefficients, examination: Examination, essential: slic
     p_value = _chance(own, examination, essential)
     if p_value <= _of_normal(least):
         return None
-    return f"{BY_NOISE} moves its size by as much once its other parameters are free: p = {p_value:.1e}"
+    return f"{BY_NOISE} changes its size by as much when its other parameters are free: p = {p_value:.1e}"
 
 
 def _unsized(step: SelectionStep, candidate: Candidate, sizes: Mapping[str, Parameter]) -> str | None:
     """Say so where the size of one of several effects that act together is not determined: it may mend what another lacks."""
     if size_is_determined(candidate.effect, sizes, step.criteria.min_size):
         return None
-    return "its size is within its uncertainty beside those that it acts with, of which it may mend what they lack"
+    return "its size is within its uncertainty beside the effects that it acts with: it may only correct their errors"
 
 
 def _repeated(step: SelectionStep, decision: Decision) -> str | None:
@@ -109,7 +109,7 @@ def _repeated(step: SelectionStep, decision: Decision) -> str | None:
     p_value = examine_moments(step, decision.candidate).p_value
     if p_value <= (criteria.significant if motions > 1 else criteria.family_error / step.tried):
         return None
-    return f"what a model lacks repeats with the motion: with repetitions counted once p = {p_value:.1e}"
+    return f"a missing effect repeats with the motion: with repetitions counted once, p = {p_value:.1e}"
 
 
 def outdone(found: Search, weights: Array, refused: Sequence[Decision]) -> list[Decision]:
@@ -143,7 +143,7 @@ def outdone(found: Search, weights: Array, refused: Sequence[Decision]) -> list[
             # What nobody believed, and is an effect, need not do all of it; what is none has to do it all.
             if other.examination.held_out >= (1.0 if unlisted else step.criteria.min_share) * saved:
                 what = other.candidate.effect.summary if unlisted else f"{other.label}, which is not believed,"
-                result.append(own.refused(f"{what} does as well in its place"))
+                result.append(own.refused(f"{what} explains as much in its place"))
                 break
     return result
 
@@ -211,7 +211,7 @@ def beaten_by_impossible(found: Search, weights: Array) -> list[Decision]:
             # What is believed has its best nonlinear parameters.
             best = max(beside.refine(others), key=lambda item: item.examination.held_out)
             if best.examination.held_out > own.examination.held_out:
-                result.append(own.refused(f"{best.label} explains more in its place, and is none: {best.why}"))
+                result.append(own.refused(f"{best.label} explains more in its place, but is impossible: {best.why}"))
     return result
 
 
@@ -286,7 +286,7 @@ def superfluous(found: Search, weights: Array, others: Sequence[Decision]) -> li
             (left,) = with_it.without(place).judge([candidate])
             if alternative.examination.held_out > own.examination.held_out and not left.accepted:
                 result.append(
-                    own.refused(f"{what}, of which the recordings hold too little, explains more in its place")
+                    own.refused(f"{what} explains more in its place, but the recordings excite it too little")
                 )
     return result
 
@@ -310,7 +310,7 @@ def uncertain(own: Coefficients, examination: Examination, essential: slice, lea
     p_value = _chance(own, examination, essential)
     if p_value <= _of_normal(least):
         return None
-    return f"beside all that was found its size is within its uncertainty: p = {p_value:.1e}"
+    return f"with all effects found in the model, its size is within its uncertainty: p = {p_value:.1e}"
 
 
 def _chance(own: Coefficients, examination: Examination, essential: slice) -> float:

@@ -343,7 +343,7 @@ def _left_again(step: SelectionStep, decision: Decision) -> str | None:
         return None
     name, unit = candidate.effect.coefficients[0].name, candidate.effect.coefficients[0].unit
     place = int(np.argmax(np.abs(whole - first)))
-    return f"{name} would be {first[place]:.2g} {unit}, but {whole[place]:.2g} {unit} until nothing of it is left in the data"
+    return f"{name} would be {first[place]:.2g} {unit}, but {whole[place]:.2g} {unit} when it is removed from the data until nothing of it is left"
 
 
 def _insignificant(step: SelectionStep, candidate: Candidate) -> str | None:
@@ -352,4 +352,4 @@ def _insignificant(step: SelectionStep, candidate: Candidate) -> str | None:
         return None
     if size_is_determined(candidate.effect, parameters_beside(step, candidate), step.criteria.min_size):
         return None
-    return "its size is within its uncertainty once its other parameters are free"
+    return "its size is within its uncertainty when its other parameters are free"

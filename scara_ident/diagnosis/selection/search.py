@@ -262,7 +262,7 @@ def _searched(
                 decisions, refused = decisions + found, refused | unsound
         else:
             # What would come in next is not believed, and not forgotten.
-            full = f"its tests let it in, but {most} effects are in the model and no more are believed at once"
+            full = f"it passed its tests, but {most} effects are in the model already and no more are believed at once"
             refused = {label: item.refused(full) for label, item in best_of_each(decisions).items() if item.accepted}
         decisions = [item for item in decisions if item.label not in refused] + list(refused.values())
         gone = None

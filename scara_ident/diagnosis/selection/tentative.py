@@ -18,7 +18,7 @@ from scara_ident.robot.robot import Robot
 # Of more than this many, the most gaining first, nobody reads the rest; nothing is decided by it.
 MAX_TENTATIVE = 6
 # What settles an effect that noise may make, where motion is no remedy: the one that shows it best shows as much of that.
-LESS_NOISE = "record positions with less noise: time stamps with all their digits, no rounding"
+LESS_NOISE = "record positions with less noise: no rounding, time stamps with all digits"
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ def settled_by(found: Search, decisions: Sequence[Decision]) -> str:
     coarse = [j for j in asked if steps[j] > 0.0 and noise[j] <= steps[j]]
     if coarse:
         each = ", ".join(f"{steps[j]:.2g} {robot.position_unit(j)} on {robot.joints[j]}" for j in coarse)
-        return f"record positions with a finer encoder than one of steps of {each}"
+        return f"record positions with a finer encoder: the steps are {each}"
     return LESS_NOISE
 
 
@@ -110,7 +110,7 @@ def _moved(robot: Robot, joint: int, travel: float, reach: float, step: float, n
     """Say how far a joint moved, of what it can, and what of that its positions hide."""
     unit = robot.position_unit(joint)
     if step > 0.0:
-        hidden = f"{travel / step:.2g} steps of its encoder of {step:.2g} {unit}"
+        hidden = f"which is {travel / step:.2g} encoder steps of {step:.2g} {unit}"
     else:
-        hidden = f"beside noise of {noise:.2g} {unit}"
+        hidden = f"with position noise of {noise:.2g} {unit}"
     return f"it moved by {travel:.2g} {unit} of {reach:.2g} {unit}, {hidden}"

@@ -69,7 +69,7 @@ def decide(
     if _wrong_sign(candidate, examination):
         # The best that a real one can be is absent: nothing is removed, and nothing speaks for it.
         examination, gain = replace(examination, p_value=1.0), min(gain, 0.0)
-    words = why or f"removes {gain:.1%} of the squared residual on data that it was not fitted to"
+    words = why or f"removes {gain:.1%} of the squared residual in cross-validation"
     tentative = why is not None and small is None and examination.p_value <= criteria.significant
     return Decision(candidate, candidate.label(scene), examination, why is None, words, gain, tentative, as_no_arm)
 
@@ -84,7 +84,7 @@ def _wrong_sign(candidate: Candidate, examination: Examination) -> bool:
 
 def _unseen(examination: Examination, criteria: SelectionCriteria) -> str | None:
     if examination.outside < criteria.absorbed:
-        return "the model absorbs it: these recordings cannot show it"
+        return "the model absorbs it, so these recordings cannot show it"
     return None
 
 
@@ -92,7 +92,9 @@ def _faint(examination: Examination, gain: float, criteria: SelectionCriteria) -
     """Say so where the model's own small errors may make it; they do not make most of what is left lie along one column."""
     if examination.outside >= criteria.min_outside or gain >= criteria.dominant:
         return None
-    return f"only {examination.outside:.1e} of it lies outside the model, whose own small errors may look like it"
+    return (
+        f"only {examination.outside:.1e} of it lies outside the model, and small errors of the model may look like it"
+    )
 
 
 def _inadmissible(candidate: Candidate, examination: Examination, scene: Scene) -> str | None:
@@ -121,7 +123,7 @@ def _small(
         return small
     if gain >= criteria.min_gain:
         return None
-    least = f"below the detection limit: removes {max(gain, 0.0):.1%} of the squared residual, {criteria.min_gain:.0%} is asked"
+    least = f"below the detection limit: removes {max(gain, 0.0):.1%} of the squared residual, {criteria.min_gain:.0%} is required"
     if gain <= 0.0 or not candidate.corrects_data:
         return least
     if small is None:
@@ -151,9 +153,9 @@ def _insignificant(examination: Examination, tried: int, criteria: SelectionCrit
         return None
     # Worth a look by its own p-value: corrected, that may be 1, and no reader would see why to look.
     if alone <= criteria.significant:
-        asked = f"{criteria.family_error / tried:.1e} is asked of one of so many"
-        return f"could be chance: one of {tried} candidates tried; p = {alone:.1e} of it alone, {asked}"
-    asked = f"{criteria.family_error:.1g} is asked"
+        asked = f"{criteria.family_error / tried:.1e} is required"
+        return f"may be chance: p = {alone:.1e} by itself, but with {tried} candidates tried {asked}"
+    asked = f"{criteria.family_error:.1g} is required"
     return f"not significant: p = {min(corrected, 1.0):.1e} over the {tried} candidates tried, {asked}"
 
 
@@ -165,4 +167,4 @@ def _seldom(candidate: Candidate, examination: Examination, gain: float, criteri
     # Of few trajectories one may be where it hardly shows: all would be asked of three.
     if gain >= criteria.dominant and voting - helps == 1 and helps > 1:
         return None
-    return f"helps in only {helps} of {voting} trajectories that it was not fitted to"
+    return f"in cross-validation it helps in only {helps} of {voting} trajectories"

@@ -45,26 +45,26 @@ DIGITS = 1e-6
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ConsistentEstimate(Estimate):
-    """An estimate that belongs to an arm that can exist, and that arm.
+    """A physically consistent estimate, and the arm that has it.
 
-    Where weighted least squares already belongs to one it is the estimate, and ``std`` is its standard deviation.
-    Where constraints hold the estimate, ``std`` is that of the directions in which it can still move, with the share of that of
-    the data alone that the data leave beyond the constraints. The curvature of the constraints is left out, which makes
-    ``std`` rather too large than too small.
+    If weighted least squares is already physically consistent, it is the estimate, and ``std`` is its standard
+    deviation. If constraints are active, ``std`` is that of the directions in which the estimate can still move, plus
+    the part of the unconstrained standard deviation that the data leave beyond the constraints. The curvature of the
+    constraints is neglected, so ``std`` is rather too large than too small.
 
     Attributes
     ----------
     standard : ndarray, shape (11 n,)
         Standard parameters of bodies and rotors, see `Robot.standard_parameters`. They give the estimated base
-        parameters to rounding and are nearest to the URDF's in everything else.
+        parameters up to rounding; in everything else they are as near to the URDF's as possible.
     active : tuple of str
         Active constraints, such as ``inertia of link2`` or ``friction of joint1``.
     was_possible : bool
-        Whether least squares without constraints was possible and is the estimate.
+        Whether least squares without constraints was physically consistent and is the estimate.
     shapes : tuple of ShapeChoice
-        What the friction of each joint was held to, and why.
+        The constraint on the friction of each joint, and the reason.
     notes : tuple of str
-        What a person should know, such as nominal bodies that the URDF lacks.
+        Remarks for the user, such as nominal bodies that the URDF lacks.
     """
 
     standard: Array
@@ -76,14 +76,15 @@ class ConsistentEstimate(Estimate):
 
 @one_blas_thread()
 def consistent(observations: Observations, *, options: ConsistentOptions | None = None) -> ConsistentEstimate:
-    """Estimate by least squares among all arms that can exist.
+    """Estimate by least squares among all physically consistent parameters.
 
     Every body has a positive semidefinite pseudo-inertia (Wensing, Kim, Slotine 2018) and every rotor a positive
-    inertia; friction takes energy out, can be overcome by the motor, and grows ever less with speed where the data do
-    not contradict that (see `choose_shapes`); each further term keeps what it declares. Every joint's rows are divided
-    by its residual, as in `wls`. Where `wls` is possible it is the result; else a prior on the nominal bodies acts on
-    directions that the data hardly determine, see ``prior_weight`` of `ConsistentOptions`. The standard parameters are those nearest to
-    the nominal bodies among all that have the estimated base parameters (see `nearest_to_nominal`).
+    inertia; friction dissipates energy, can be overcome by the motor, and grows less and less with speed if the data do
+    not contradict that (see `choose_shapes`); other terms keep the constraints that they declare. Every joint's rows
+    are divided by its residual, as in `wls`. If the result of `wls` is physically consistent, it is the result.
+    Otherwise a prior on the nominal bodies acts on directions that the data hardly determine, see ``prior_weight`` of
+    `ConsistentOptions`. Of all standard parameters that have the estimated base parameters, those nearest to the
+    nominal bodies are chosen (see `nearest_to_nominal`).
 
     Parameters
     ----------
@@ -97,9 +98,9 @@ def consistent(observations: Observations, *, options: ConsistentOptions | None 
     Raises
     ------
     EstimationError
-        If there is nothing to estimate from or the problem cannot be solved.
+        If there is no recording, or the problem cannot be solved.
     UsageError
-        If an option names what the robot or the model does not have.
+        If an option names something that the robot or the model does not have.
 
     Examples
     --------
@@ -289,16 +290,16 @@ def _notes(u: Unknowns, active: tuple[str, ...], value: Array, covariance: Array
     slow = [p.joint for p in held if not np.isfinite(p.speed)]
     if slow:
         notes.append(
-            f"{', '.join(slow)}: no velocity limit is known; friction takes energy out at every speed, and the "
-            "motor's limit is not used"
+            f"{', '.join(slow)}: no velocity limit is known; friction dissipates energy at every speed, and the "
+            f"motor's limit is not used"
         )
     if active:
-        notes.append(f"held by what an arm can have: {', '.join(active)}")
+        notes.append(f"limited by physical consistency: {', '.join(active)}")
     moved = MARGIN * u.sizes(value)
     std = np.sqrt(np.clip(np.diag(covariance), 0.0, None))
     if active and np.any((std > 0.0) & (moved > 0.1 * std)):
         notes.append(
-            f"the data are so good that the distance of {MARGIN:g} kept from bodies without extent is more than a "
-            "tenth of a standard deviation"
+            f"the data are so precise that the minimum extent of bodies, {MARGIN:g}, changes parameters by more than a "
+            f"tenth of a standard deviation"
         )
     return tuple(notes)

@@ -298,8 +298,9 @@ def check_consistency(
         distance_std = 0.0 if possible else _distance_std(model, value, information)
     if possible is None:
         reasons.append(
-            f"undecided whether bodies with these base parameters exist: the best found lack {-found.margin:.1g} of "
-            "the nominal ones, and the solver does not prove that none are better; check the inertias in the URDF"
+            f"whether bodies with these base parameters exist is undecided: the best ones found miss "
+            f"{-found.margin:.1g} of the nominal ones, and the solver does not prove that there are no better ones; "
+            f"check the inertias in the URDF"
         )
     return PhysicalConsistency(possible, tuple(reasons), found.margin, distance_std)
 
@@ -362,7 +363,7 @@ def _together_reason(columns: Sequence[Column], values: Array) -> str:
     listed = ", ".join(f"{c.name} = {v:.3g} {c.unit}" for c, v in zip(columns, values, strict=True))
     if len(columns) == 1:
         return f"{listed} belongs to no bodies with mass"
-    return f"{listed} cannot all be true: no bodies with mass have them together"
+    return f"{listed} contradict each other: no bodies with mass have all of them"
 
 
 def _friction_reason(model: TorqueModel, fault: FrictionFault, polynomial: BrakingPolynomial) -> str:

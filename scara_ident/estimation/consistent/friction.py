@@ -251,7 +251,7 @@ def shape_faults(polynomial: BrakingPolynomial, parameters: Array) -> tuple[str,
     size = ROUNDING * float(np.max(np.abs(scaled)))
     found = []
     if 2.0 * scaled[2] > size or 2.0 * scaled[2] + 6.0 * scaled[3] > size:
-        found.append(f"friction of {polynomial.joint} grows ever faster with speed")
+        found.append(f"friction of {polynomial.joint} grows more and more with speed")
     if scaled[1] + 2.0 * scaled[2] + 3.0 * scaled[3] < -size or scaled[1] < -size:
         found.append(f"friction of {polynomial.joint} falls with speed")
     return tuple(found)

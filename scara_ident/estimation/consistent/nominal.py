@@ -83,8 +83,8 @@ def nominal(robot: Robot) -> Nominal:
         armature[unknown] = guess[unknown]
         names = ", ".join(name for name, is_unknown in zip(robot.joints, unknown, strict=True) if is_unknown)
         notes.append(
-            f"rotor inertia of {names}: stated neither in the URDF nor in robot.yaml; where torque does not determine it, it is "
-            "taken near what a motor of that size has"
+            f"rotor inertia of {names}: stated neither in the URDF nor in robot.yaml; where the torque does not "
+            f"determine it, it stays near that of a motor of that size"
         )
     weights = np.where(unknown, GUESS_WEIGHT, 1.0)
     return Nominal(stacked, armature, weights, _to_standard(stacked, armature), tuple(notes))
@@ -106,7 +106,9 @@ def _physical(matrix: Array, mass: float, radius: float) -> tuple[Array, str]:
     floor = THINNEST * values[-1]
     if values[0] < floor:
         if values[0] < -1e-6 * values[-1]:
-            note = "the URDF's inertia is no body's (it breaks the triangle inequality); the prior uses one near it"
+            note = (
+                "no body can have the URDF's inertia (it violates the triangle inequality); the prior uses one near it"
+            )
         values = np.maximum(values, floor)
     central = vectors * values @ vectors.T
     result = np.empty((4, 4))

@@ -37,9 +37,9 @@ class ConsistentOptions(Frozen):
     Attributes
     ----------
     friction : {"auto", "lubricated", "dissipative", "free"} or mapping of str to one of them
-        What the friction of every joint fulfils. ``dissipative``: it takes energy out and the motor can overcome it
-        up to the velocity limit; ``lubricated``: that, and it is non-decreasing and concave in speed; ``free``:
-        nothing. By default ``auto``: lubricated unless the data contradict it, then dissipative, joint by joint, see
+        Constraint on the friction of every joint. ``dissipative``: it dissipates energy, and the motor can overcome it
+        up to the velocity limit; ``lubricated``: in addition it is non-decreasing and concave in speed; ``free``: no
+        constraint. By default ``auto``: lubricated unless the data contradict it, then dissipative, for each joint, see
         `scara_ident.estimation.consistent.shape`. A mapping gives it by joint; the others are ``auto``.
     speed : mapping of str to float
         Velocity limits to use instead of the URDF's, by joint, rad/s or m/s.
@@ -48,7 +48,7 @@ class ConsistentOptions(Frozen):
     link_mass : mapping of str to (float, float)
         Mass of a link with all that is fixed to it, and its tolerance, kg; by the name of the link or its joint.
     com : {"free", "visual"} or mapping of str to Ellipsoid
-        Where the centres of mass may lie: anywhere, within the bounding box of the link's visual shape, or
+        Where the centres of mass may be: anywhere, within the bounding box of the link's visual shape, or
         within an ellipsoid, by the name of the link or its joint.
     priors : mapping of str to (float, float)
         Mean and standard deviation of parameters, by the name of the model's parameter or of a standard
@@ -56,9 +56,10 @@ class ConsistentOptions(Frozen):
     noise : ndarray, shape (n,), optional
         Standard deviation of each joint's torque, by which its rows are divided; by default its residual in `wls`.
     prior_weight : float
-        Weight of the nominal bodies against the data where plain least squares is impossible: a change of a body by
-        its own size against one standard deviation of the noise. The default of 0.01 moves no direction that the
-        data determine by as much as a tenth of its standard deviation, however wrong the URDF is, see
+        Weight of the nominal bodies relative to the data if plain least squares is not physically consistent: a change
+        of a body by its own size relative to one standard deviation of the noise. With the default of 0.01 the prior
+        moves directions that the data determine by less than a tenth of their standard deviation, even if the URDF is
+        wrong, see
         `scara_ident.estimation.consistent.prior`.
     """
 
@@ -95,5 +96,5 @@ class ConsistentOptions(Frozen):
                 raise UsageError(f"prior of {name}: standard deviation {std:g}; it must be above 0")
 
     def friction_of(self, joint: str) -> FrictionOption:
-        """Return what the friction of a joint is asked to fulfil."""
+        """Return the constraint on the friction of a joint."""
         return self.friction if isinstance(self.friction, str) else self.friction.get(joint, "auto")

@@ -386,5 +386,5 @@ def _what_to_try(status: str, options: ConsistentOptions) -> str:
         )
     else:
         what = "was not solved"
-        advice = "; record motion that tells more, take another model, or the method wls, which asks for no arm that can exist"
+        advice = "; record a motion with better excitation, use another model, or use the method wls, which does not require physical consistency"
     return f"the estimation problem {what} (CLARABEL: {status}){advice}"

@@ -82,7 +82,7 @@ def choose_shapes(
         if asked != "auto":
             found.append(ShapeChoice(polynomial.joint, asked, None, "as asked for"))
         elif not np.isfinite(polynomial.speed):
-            why = "no velocity limit is known up to which it could grow"
+            why = "no velocity limit is known, up to which it would have to grow"
             found.append(ShapeChoice(polynomial.joint, "dissipative", None, why))
         else:
             p_value = lubricated_p_value(polynomial, observations, plain)

@@ -160,8 +160,9 @@ def solve_consistent(
     x = _inside(u, point.x, margin) if margin > -DIGITS else None
     if x is None:
         raise EstimationError(
-            f"no arm that can exist was found (the solution misses its constraints by {-margin:.1g}); record motion that tells "
-            "more, check the signs of efforts and positions, or take the method wls, which asks for no such arm"
+            f"no physically consistent arm was found (the solution violates its constraints by {-margin:.1g}); record "
+            f"a motion with better excitation, check the signs of efforts and positions, or use the method wls, which "
+            f"does not require physical consistency"
         )
     return ConsistentSolution(x, u.parameters(x), point)
 

@@ -44,16 +44,17 @@ _STATES = 48
 class RegressorKernel(Frozen):
     """The joint-torque regressor of one model, evaluated over vectors of samples.
 
-    It is on the joint side, without rotor inertia and reductions, in Pinocchio's velocity order.
+    It is for the joint side, without rotor inertia and reductions, in Pinocchio's velocity order.
 
     Attributes
     ----------
     nv : int
         Number of joints.
     columns : ndarray of intp (p,)
-        Standard parameters that it gives: 10 per body, bodies in Pinocchio's order, within a body `PARAMETERS`.
+        Standard parameters of the columns: 10 per body, bodies in Pinocchio's order, within a body in the order of
+        `PARAMETERS`.
     pattern : ndarray of bool (nv, p)
-        False where the entry is zero for every state.
+        False if the entry is zero for every state.
     """
 
     nv: int
@@ -102,7 +103,7 @@ class RegressorKernel(Frozen):
         return out
 
     def fill(self, q: ArrayLike, v: ArrayLike, a: ArrayLike, targets: Mapping[int, Array]) -> None:
-        """Evaluate the entries that are not zero for every state, each into a vector of its own.
+        """Evaluate the entries that are not zero for every state, each into its own vector.
 
         Parameters
         ----------
@@ -143,14 +144,14 @@ class RegressorKernel(Frozen):
 
 
 def build_kernel(model: pin.Model, columns: Sequence[int] | NDArray[np.intp] | None = None) -> RegressorKernel:
-    """Trace, emit and check the regressor of a model, once for all models of the same joints and gravity.
+    """Trace, generate and check the regressor of a model, once for all models with the same joints and gravity.
 
     Parameters
     ----------
     model : pin.Model
         Revolute, continuous and prismatic joints, in a chain or a tree; its gravity is used.
     columns : sequence of int, optional
-        Standard parameters whose columns are wanted, each in 0 .. 10 nbodies - 1; all by default.
+        Standard parameters whose columns are computed, each in 0 .. 10 nbodies - 1; all by default.
 
     Returns
     -------
@@ -159,11 +160,11 @@ def build_kernel(model: pin.Model, columns: Sequence[int] | NDArray[np.intp] | N
     Raises
     ------
     RobotError
-        The model has a joint of another kind.
+        If the model has a joint of another kind.
     RegressorMismatch
-        The kernel does not reproduce Pinocchio's regressor.
+        If the kernel does not reproduce Pinocchio's regressor.
     ValueError
-        There is no such column.
+        If a column does not exist.
     """
     joints = joint_geometry(model)
     parts = [(item.axis.tobytes(), item.rotation.tobytes(), item.offset.tobytes()) for item in joints]

@@ -214,7 +214,7 @@ _ESTIMATORS = {
     "ols": "least squares",
     "wls": "weighted least squares",
     "rls": "recursive least squares",
-    "consistent": "weighted least squares of an arm that can exist",
+    "consistent": "weighted least squares with physically consistent parameters",
 }
 
 
@@ -235,8 +235,9 @@ def chance(probability: float) -> str:
 def information_words(log_det: float | None, condition: float | None) -> str:
     """Say what the motion tells of the parameters, by the two numbers of Indri et al. (2002)."""
     return (
-        f"What the motion tells of all parameters together: J_d = ln det HᵀH = {number(log_det, 4)}, the more the better. How "
-        f"evenly: the condition J_k = cond HᵀH = {number(condition)}, small where no parameter is hidden behind others."
+        f"Information of the motion about all parameters together: J_d = ln det HᵀH = {number(log_det, 4)}; larger is "
+        f"better. Condition number J_k = cond HᵀH = {number(condition)}; it is small if no combination of parameters "
+        f"is poorly excited."
     )
 
 

@@ -48,7 +48,7 @@ def check_report(path: Path, found: Check) -> None:
     )
     seconds = sum(float(np.ptp(each.motion.time)) for each in found.drives)
     subtitle = (
-        f"{seconds:.4g} s for {several(robot.n, 'joint')}; torques foreseen by the {found.known.model.name} model"
+        f"{seconds:.4g} s for {several(robot.n, 'joint')}; torques predicted by the {found.known.model.name} model"
     )
     Page(f"Check of {found.name}", subtitle, said, parts("check", sections, found), bool(found.broken)).write(path)
 
@@ -89,7 +89,7 @@ def _limits(found: Check) -> list[Block]:
     head = ["limit", "reached", "±", "bound", "unit", "at [s]", "used", "beyond it [s]"]
     if not found.broken:
         head, rows = head[:-1], [row[:-1] for row in rows]
-    words = "The value of each that is nearest to its limit, or farthest beyond. Torque is that of the drive, with its rotor, on the side where effort is recorded; ± is two standard deviations of it, by the parameters and the model's error on recordings. Used: of a position, the share of the way from the middle of the range."
+    words = "For each limit the value that is nearest to it or farthest beyond it. Torque is the torque of the drive, including its rotor, on the side where effort is recorded; ± is two standard deviations, from the parameters and the model's error on recordings. Used, for a position: the share of the distance from the middle of the range to its end."
     return [Paragraph(words), Table(head, rows, (1, 2, 3, 5))] if rows else []
 
 
@@ -148,10 +148,10 @@ def _energy(found: Check) -> list[Block]:
     ]
     head = ("joint", "given [J]", "taken back [J]", "heat [J]", *(f"{each} [J]" for each in names))
     words = (
-        f"At the drives' shafts: resistance of windings and losses of the electronics come on top. Given less taken back is the sum "
-        f"of the parts on the right; {_heat_words(energy)}."
+        f"At the drives' shafts, without losses of windings and electronics. Given minus taken back is the sum of the "
+        f"parts on the right; {_heat_words(energy)}."
     )
-    plot = Plot("time [s]", (Panel("given less taken back [J]", _balances(found), 180),))
+    plot = Plot("time [s]", (Panel("given minus taken back [J]", _balances(found), 180),))
     figure = single("energy-time", "Energy of each drive over time", "", plot)
     return [Paragraph(words), Table(head, rows, tuple(range(1, len(head)))), Group("energy-group", (figure,))]
 
@@ -161,7 +161,7 @@ def _heat_words(energy: Energy) -> str:
     if len(energy.heat) < 2:
         return f"of these {', '.join(energy.heat) or 'none'} becomes heat"
     negative = any(np.any(energy.work[each] < 0.0) for each in energy.heat)
-    why = ", and a negative one belongs to the curve of friction that they make together" if negative else ""
+    why = "; a negative one belongs to a friction curve, which only their sum describes" if negative else ""
     return f"of these the sum of {', '.join(energy.heat)} becomes heat{why}"
 
 

@@ -81,15 +81,17 @@ def _trajectories(context: ComparisonContext) -> list[Block]:
     head = ["trajectory", "J_d", "J_k"]
     head += [f"{what}, {joint}{context.unit(joint, kind)}" for _, what, kind in columns for joint in context.joints]
     head.append("runs")
-    words = "J_d: what the motion tells of all parameters together (ln det); J_k: condition, small where no parameter is hidden behind others."
+    words = "J_d: information of the motion about all parameters together (ln det); J_k: condition number, small if no combination of parameters is poorly excited."
     return [Paragraph(words), Table(head, rows, range(1, len(head)))]
 
 
 def _errors(context: ComparisonContext) -> list[Block]:
     """The error on every trajectory with the parameters from every other."""
     words = (
-        "Rms error on the trajectory of the row with parameters from that of the column. The colour is the ratio to the row's own error, "
-        f"none at 1 and full at {FULL_RATIO:g}; in brackets what the covariance of the parameters promises, a dash where one that counts has no standard deviation. Where the error is over twice that (▲), bias is at work and not noise."
+        "Rms error on the trajectory of the row with the parameters from the trajectory of the column. The colour is "
+        f"the ratio to the row's own error: no colour at 1, full colour at {FULL_RATIO:g}. In brackets: the error that "
+        f"the covariance of the parameters predicts, or a dash if a parameter has no standard deviation. An error more "
+        f"than twice that value (▲) is bias and not noise."
     )
     blocks: list[Block] = [Paragraph(words), Scale("own error", f"{FULL_RATIO:g} times the own error")]
     for joint in context.joints:
@@ -142,7 +144,7 @@ def _parameters(context: ComparisonContext) -> list[Block]:
                 Cell(superscripts(entries[0].get("unit", "")), "unit"),
             ]
         )
-    words = "Colour: how many of its own standard deviations a value lies above (blue) or below (vermillion) the median of the trajectories, full at six. Strong colours are disagreement that noise does not explain."
+    words = "Colour: by how many of its standard deviations a value is above (blue) or below (vermillion) the median of the trajectories; full colour at six. Noise does not explain strong colours."
     scale = Scale("6 std below the median", "6 std above", two_sided=True)
     return [Paragraph(words), scale, Table(("name", "URDF", *names, "unit"), rows, range(1, len(names) + 2))]
 
@@ -171,13 +173,13 @@ def _friction_curves(context: ComparisonContext) -> list[Block]:
         panel = Panel(f"friction{context.unit(joint, 'torque')}", layers, 230)
         plot = Plot(f"speed{context.unit(joint, 'velocity')}", (panel,))
         figures.append(single(f"friction-{len(figures)}", f"Friction of {joint}", "", plot))
-    words = "Friction as every trajectory sees it: a full line over the speeds that it covers, dotted beyond them, which is extrapolation."
+    words = "Friction identified from each trajectory: solid over the speeds that the trajectory covers, dotted where it is extrapolated."
     return [Paragraph(words), Group("friction-group", figures, (), "two")]
 
 
 SECTIONS: tuple[Section, ...] = (
     NamedSection("trajectories", "Trajectories", _trajectories),
-    NamedSection("errors", "Every trajectory from every other", _errors),
+    NamedSection("errors", "Every trajectory predicted with every other's parameters", _errors),
     NamedSection("parameters", "Parameters", _parameters),
     NamedSection("friction", "Friction", _friction_curves),
     notes_section(lambda context: context.content.get("notes")),

@@ -69,11 +69,12 @@ def _contacts(found: ContactFindings) -> list[Block]:
         )
     loaded = f"{MIN_JOINTS} joints or more" if robot.n > MIN_JOINTS else "all joints"
     words = (
-        "Torque is the mean on the first joint while it is strong, on the side where effort is recorded. The place is the tool where a constant force "
-        f"there explains the torque of {loaded}, else the outermost link that is loaded: the contact is there or farther out."
+        "Torque is the mean on the first joint while the contact is strong, on the side where effort is recorded. The "
+        f"place is the tool if a constant force at the tool explains the torque of {loaded}; otherwise it is the "
+        f"outermost loaded link, and the contact is on that link or farther out."
     )
     if any(each.estimate.point is not None for each in found.contacts):
-        words += " A force that is determined beside the tool acts on a point of that link, given in its frame, as near to the tool as the torque allows."
+        words += " A force that does not act at the tool is given for the point of the link that is nearest to the tool and agrees with the torque, in the frame of the link."
     head = ("recording", "from [s]", "to [s]", "joints", "torque", "over threshold", "place", "force", "point [m]")
     return [Paragraph(words), Table(head, rows, (1, 2, 4, 5, 7, 8))] if rows else []
 
@@ -88,7 +89,7 @@ def _torque(found: ContactFindings) -> list[Block]:
     selector = Selector("recording", tuple(run.name for run in shown))
     return [
         Paragraph(
-            "Dashed: thresholds, which grow about reversals, with speed and with the rate of momentum. Shaded: contacts."
+            "Dashed: thresholds; they are larger near reversals, at high speed and when the momentum changes fast. Shaded: contacts."
         ),
         Group("external-group", (figure,), (selector,)),
     ]
@@ -119,7 +120,7 @@ def _thresholds(found: ContactFindings) -> list[Block]:
     ]
     head = ("joint", "unit", "fast, backwards", "slow, backwards", "at rest", "slow, forwards", "fast, forwards")
     words = (
-        f"Thresholds by speed and direction; what the rate of momentum and the effort add comes on top. They follow from "
+        f"Thresholds by speed and direction, without the parts for the rate of momentum and the effort. They come from "
         f"{alarm.clusters} peaks of the residual in {3600.0 * alarm.hours:.4g} s without contact."
     )
     return [Paragraph(words), Table(head, rows, (2, 3, 4, 5, 6))]

@@ -101,7 +101,11 @@ def _story(context: DiagnosisContext) -> list[Block]:
     diagnosis = context.diagnosis
     if not diagnosis.effects:
         tried = diagnosis.search.tried
-        return [Paragraph(f"{tried} candidates were tried and none was let in; their reasons stand under Candidates.")]
+        return [
+            Paragraph(
+                f"{tried} candidates were tried and none was added to the model; the reasons are under Candidates."
+            )
+        ]
     blocks: list[Block] = []
     for effect, chapter in context.chapters:
         blocks += [Heading(f"{chapter.number}. {effect.title}"), *_effect_words(effect, context)]
@@ -121,8 +125,8 @@ def _story(context: DiagnosisContext) -> list[Block]:
     ]
     if rows:
         blocks += [
-            Heading("Parameters that the missing effects had bent"),
-            Paragraph("They had stood for what the model lacked; by over three standard deviations."),
+            Heading("Parameters that the missing effects had biased"),
+            Paragraph("These parameters changed by more than three standard deviations when the effects were added."),
             Table(("name", "URDF", "before", "after", "change / std", "unit", "meaning"), rows, (1, 2, 3, 4)),
         ]
     return blocks
@@ -137,8 +141,8 @@ def _said(effect: FoundEffect) -> str:
 def _held_out(gain: HeldOutGain, context: DiagnosisContext) -> str:
     criteria, words = context.diagnosis.search.step.criteria, words_of(gain, context.unit(gain.joint))
     if gain.borne_out(criteria):
-        return f"On the recordings held out, which no choice has seen, it removes {gain.share:.0%}; {words}."
-    return f"It is not {'borne out' if gain.against(criteria) else 'confirmed'} by the recordings held out: {words}."
+        return f"On the held-out recordings, which no choice has used, it removes {gain.share:.0%} of the squared residual; {words}."
+    return f"It is not {'supported' if gain.against(criteria) else 'confirmed'} by the held-out recordings: {words}."
 
 
 def _effect_words(effect: FoundEffect, context: DiagnosisContext) -> list[Block]:
@@ -152,9 +156,10 @@ def _effect_words(effect: FoundEffect, context: DiagnosisContext) -> list[Block]
     )
     p_value = chance(effect.p_value)
     words = (
-        f"{effect.description[:1].upper()}{effect.description[1:]}. It removes {effect.gain:.0%} of the squared residual on data that it was not "
-        f"fitted to, helps in {helps} of {voting} trajectories that excite it, and would come about by chance with p {'' if p_value.startswith('<') else '= '}{p_value}. "
-        f"Rms on the training recordings: {gains}."
+        f"{effect.description[:1].upper()}{effect.description[1:]}. In cross-validation it removes {effect.gain:.0%} "
+        f"of the squared residual and helps in {helps} of {voting} trajectories that excite it; the probability that "
+        f"it is chance is p {'' if p_value.startswith('<') else '= '}{p_value}. Rms on the training recordings: "
+        f"{gains}."
     )
     if effect.held_out is not None:
         words += f" {_held_out(effect.held_out, context)}"
@@ -170,7 +175,7 @@ def _effect_words(effect: FoundEffect, context: DiagnosisContext) -> list[Block]
     blocks: list[Block] = [Paragraph(words), Table(("parameter", "value", "std", "unit"), rows, (1, 2))]
     doubted = effect.held_out is not None and effect.held_out.against(context.diagnosis.search.step.criteria)
     if not effect.size_determined and not doubted:
-        blocks.append(Paragraph("It is there by what it removes, but its size is not settled."))
+        blocks.append(Paragraph("It is significant, but its size is not determined."))
     if len(found := intervals(effect, context.diagnosis)) > 1:
         blocks += [Paragraph("It acts in these intervals:"), _interval_table(found)]
     if effect.confounded_with:
@@ -180,7 +185,7 @@ def _effect_words(effect: FoundEffect, context: DiagnosisContext) -> list[Block]
                 effect.confounder_names(context.diagnosis.search.scene), effect.confounded_with, strict=True
             )
         )
-        blocks.append(Paragraph(f"These recordings cannot tell it from: {others}."))
+        blocks.append(Paragraph(f"These recordings cannot distinguish it from: {others}."))
     return blocks
 
 
@@ -212,11 +217,11 @@ def _next(context: DiagnosisContext) -> list[Block]:
     # The last ones are what the model absorbs on any data, which has a table of its own.
     found = [item.sentence() for item in steps[: len(steps) - aliases]]
     blocks: list[Block] = [
-        Listing(tuple(found)) if found else Paragraph("Nothing in these recordings asks for another experiment.")
+        Listing(tuple(found))
+        if found
+        else Paragraph("No other experiment is needed for what these recordings can show.")
     ]
-    absorbed = (
-        f"Another {several(aliases, 'effect')} would need a measurement of another kind: see What cannot be known."
-    )
+    absorbed = f"{several(aliases, 'effect')} more would need a measurement of another kind: see What cannot be known."
     return [*blocks, Paragraph(absorbed)] if aliases else blocks
 
 
@@ -226,7 +231,7 @@ def _left(context: DiagnosisContext) -> list[Block]:
     blocks = [*_repeating(context), *_depending(context)]
     if diagnosis.unexplained is not None:
         group = remainder_group(diagnosis.robot, diagnosis.unexplained, context.sets["training"])
-        blocks += [] if group is None else [Heading("What no effect accounts for"), group]
+        blocks += [] if group is None else [Heading("What no effect explains"), group]
     return [*blocks, *residual_blocks(diagnosis.robot, context.sets, diagnosis.search.bands)]
 
 
@@ -238,7 +243,7 @@ def _repeating(context: DiagnosisContext) -> list[Block]:
         values = (before, number(fit.missing), number(fit.noise), context.unit(fit.joint), chance(fit.p_value))
         rows.append([name(fit.joint), *values, Cell(tag=_repeats(fit))])
     head = ("joint", "repeats, before", "repeats, after", "does not repeat", "unit", "p", "")
-    words = "From repetitions: what of the residual repeats from run to run, which a model could explain, against what does not (rms)."
+    words = "From repetitions: the part of the residual that repeats from run to run, which a model could explain, and the part that does not (rms)."
     return [Paragraph(words), Table(head, rows, (1, 2, 3, 5))] if rows else []
 
 
@@ -259,9 +264,9 @@ def _depending(context: DiagnosisContext) -> list[Block]:
         for item in [item for item in context.diagnosis.dependences if item.explained > MIN_EXPLAINED][:6]
     ]
     if rows:
-        words = "What the remainder depends on: share of its square that means over signals explain on trajectories that they were not taken from."
+        words = "What the remainder depends on: the share of its mean square that its means over signals explain, in cross-validation over trajectories."
         return [Paragraph(words), Table(("joint", "signals", "explained", "rms"), rows, (2, 3))]
-    words = "On no signal or pair of signals does the remainder depend in a way that holds on trajectories that it was not taken from."
+    words = "In cross-validation over trajectories the remainder depends on no signal and on no pair of signals."
     return [Paragraph(words)] if context.diagnosis.dependences else []
 
 
@@ -281,7 +286,7 @@ def _unknowable(context: DiagnosisContext) -> list[Block]:
     ]
     none = Paragraph("None among the effects found." if effects else "No effect was found.")
     blocks: list[Block] = [
-        Heading("Groups that these recordings cannot tell apart"),
+        Heading("Groups that these recordings cannot distinguish"),
         Listing(tuple(groups)) if groups else none,
     ]
     rows: list[list[Cell | str]] = [
@@ -296,7 +301,7 @@ def _unknowable(context: DiagnosisContext) -> list[Block]:
     if rows:
         blocks += [
             Heading("Effects that the model absorbs on any data"),
-            Paragraph("Neither found nor excluded: whatever the arm does, these parameters take them up."),
+            Paragraph("Neither found nor excluded: on any motion these parameters absorb them."),
             Table(("effect", "joints", "absorbed by", "what would show it"), rows),
         ]
     return blocks
@@ -315,15 +320,15 @@ def _worth(context: DiagnosisContext) -> list[Block]:
         title = item["effect"] if item["joint"] is None else f"{item['effect']} on {item['joint']}"
         rows.append((f"PID alone, arm without {title}", item["pid_without_it"]))
         if item["fed_without_it"] is not None:
-            rows.append((f"all fed forward but {title}", item["fed_without_it"]))
+            rows.append((f"all in the feed-forward except {title}", item["fed_without_it"]))
     joints = context.diagnosis.robot.joints
     head = ["rms tracking error", *(f"{joint} [{superscripts(found['units'][joint])}]" for joint in joints)]
     cells: list[list[Cell | str]] = [
         [name(words), *(number(errors[joint]) for joint in joints)] for words, errors in rows
     ]
     words = (
-        "A virtual arm with the effects, drawn about the model by its standard deviations, follows a motion of "
-        f"{found['trajectory']['duration']:.3g} s that no one has recorded."
+        f"A virtual arm with the effects follows a motion of {found['trajectory']['duration']:.3g} s that was not "
+        "recorded. Its parameters are drawn at random from the identified values and their standard deviations."
     )
     return [*said, Paragraph(words), Table(head, cells, range(1, len(head)))]
 
@@ -375,7 +380,7 @@ def _picture(context: DiagnosisContext) -> Gains | None:
     kind, words = next(each for each in PICTURED if context.content[each[0]]["before"])
     before, after = (context.content[kind][when] for when in ("before", "after"))
     each = [Gain(joint, before[joint], after[joint], context.unit(joint)) for joint in before if before[joint]]
-    title = f"Rms residual on {words} recordings, without and with what was found; every joint on its own scale"
+    title = f"Rms residual on {words} recordings, without and with the effects found; each joint on its own scale"
     return Gains(title, tuple(each))
 
 
@@ -388,7 +393,7 @@ def _verdict(diagnosis: Diagnosis, summary: Sequence[str]) -> tuple[str, ...]:
         # The first of the sentences says so already.
         return tuple(summary)
     if diagnosis.verdict == "explained":
-        return (f"Explained: the model lacked {found}; what is left is noise, or smaller than it.", *summary)
+        return (f"Explained: the model lacked {found}; what is left is noise, or smaller than the noise.", *summary)
     lacks = f"the model lacked {found}, and something" if found else "something"
     where = f" on {diagnosis.unexplained.joint}" if diagnosis.unexplained else ""
-    return (f"Not all explained: {lacks}{where} is left that no known effect accounts for.", *summary)
+    return (f"Not all explained: {lacks}{where} is left that no known effect explains.", *summary)

@@ -52,11 +52,13 @@ def gain_blocks(content: Mapping[str, Any], robot: Robot) -> list[Block]:
         for j, joint in enumerate(robot.joints)
         for when in times
     ]
-    said = f"Rms residual within the band. {left_out_words(content)} Held-out recordings took no part in any choice; the noise floor is what does not repeat."
+    said = f"Rms residual within the band. {left_out_words(content)} No choice used the held-out recordings; the noise floor is what does not repeat."
     if any("after_own_offset" in content[kind] for kind, _ in RECORDINGS):
-        said += " Offsets of the torques differ from recording to recording: own offsets is what is left beside one of each's own."
+        said += " The torque offsets differ from recording to recording; own offsets: the error after each recording's own offset is removed."
     return [
-        Paragraph(said if len(times) > 1 else f"{said} Nothing came into the model: before and after are the same."),
+        Paragraph(
+            said if len(times) > 1 else f"{said} No effect was added to the model: before and after are the same."
+        ),
         Table(head, rows, numeric),
         Folded("every recording", Table(("recording", "", *columns), detail, range(2, 2 + len(columns)))),
     ]
@@ -74,12 +76,14 @@ def candidate_blocks(content: dict[str, Any]) -> list[Block]:
     rows: list[list[Cell | str]] = []
     for effect in content["effects"]:
         title = effect["effect"] if effect["joint"] is None else f"{effect['effect']} of {effect['joint']}"
-        why = f"removes {effect['gain']:.1%} of the squared residual at that point on data that it was not fitted to"
+        why = f"at that step it removes {effect['gain']:.1%} of the squared residual in cross-validation"
         rows.append(_candidate({**effect, "label": title, "why": why, "decision": "accepted"}, most))
     rows += [_candidate(row, most) for row in content["candidates"]]
     words = (
-        "First the effects found, in the order in which they came in; then what else was tried beside them, best member of every family. "
-        "Gain: share of the squared residual removed on data not fitted to; p is corrected for all that was tried; helps in: trajectories, of those that excite it."
+        "First the effects found, in the order in which they were added; then the other candidates, with the effects "
+        "found in the model: the best member of each family. Gain: share of the squared residual removed in "
+        "cross-validation; p is corrected for the number of candidates; helps in: number of trajectories, of those "
+        "that excite it."
     )
     blocks: list[Block] = [Paragraph(words), Table(CANDIDATE_HEAD, rows[:SHOWN_CANDIDATES], (2,))]
     more = rows[SHOWN_CANDIDATES:]
@@ -117,8 +121,8 @@ def tentative_blocks(content: Mapping[str, Any]) -> Sequence[Block]:
         for item in content["tentative"]
     ]
     words = (
-        "Not believed and not in the model. The gain is the share of its joint's squared residual that it would remove on "
-        "data that it was not fitted to."
+        "Not believed and not in the model. The gain is the share of its joint's squared residual that it would remove "
+        "in cross-validation."
     )
     head = ("effect", "gain", "p over all tried", "why it is not believed", "what would settle it")
     return [Paragraph(words), Table(head, rows, (1, 2))] if rows else []
@@ -142,8 +146,9 @@ def evidence_blocks(content: Mapping[str, Any]) -> Sequence[Block]:
         for joint, item in content["evidence"].items()
     ]
     words = (
-        "That nothing was found says little where nothing could have been found. Of the effects tried on a joint, half would "
-        "have had to remove at least the detection limit, a share of its squared residual, to come in. Torques are rms."
+        "Finding no effect means little if none could have been found. Half of the effects tried on a joint would have "
+        "had to remove at least the detection limit, a share of its squared residual, to be accepted. Torques are "
+        "rms."
     )
     return [Paragraph(words), Table(("joint", "what is left", "detection limit", "why"), rows, (2,))]
 
@@ -164,9 +169,9 @@ def events_blocks(robot: Robot, events: Sequence[Event]) -> Sequence[Block]:
         for event in events
     ]
     words = (
-        "Stretches, or whole recordings, that are not explained while others are: no parameter, but something that happened. "
-        "Times are seconds since the recording began; the size is the rms on each joint, the force what a constant one at "
-        "the tool would have to be."
+        "Stretches of time, or whole recordings, that the model does not explain although it explains the others: no "
+        "parameter, but something that happened. Times are in seconds from the start of the recording; the size is "
+        "the rms on each joint; the force is the constant force at the tool that would explain it."
     )
     head = ("recording", "from [s]", "to [s]", "joints", "rms", "kind", "force", "")
     return [Paragraph(words), Table(head, rows, (1, 2, 4, 6))] if rows else []
@@ -200,8 +205,9 @@ def variation_blocks(robot: Robot, variation: RunVariation | None, runs: Sequenc
         each.append([name(joint), Cell(variation.kinds[k], "unit"), *(value for value, _ in found), found[0][1]])
     head = ["joint", "what differs", *runs, "unit"]
     words = (
-        "Standard deviation between runs, beyond what noise makes of them; it is in the standard deviations of all parameters. "
-        "Friction and torque scale are shares of what the model predicts. Kinds that chance explains are left out."
+        "Standard deviation between runs, in addition to noise; it is included in the standard deviations of all "
+        "parameters. Friction and torque scale are shares of the predicted torque. Kinds that chance explains are "
+        "left out."
     )
     return [
         Paragraph(words),

@@ -58,12 +58,12 @@ class ExcitationContext:
 
 
 def _motion(k: int, context: ExcitationContext) -> list[Block]:
-    """One trajectory: the moving arm, what the data will cover, and signals over time."""
+    """One trajectory: the moving arm, states that the data will cover, and signals over time."""
     robot, motion = context.robot, context.motions[k]
     bounds = {limit: float(each["bound"]) for limit, each in context.limits if each.get("bound") is not None}
     figures = [_joint_figure(robot, motion, j, k, bounds) for j in range(robot.n)]
     covers = [_cover_figure(robot, motion, j, k, bounds) for j in range(robot.n)]
-    torque = "" if motion.torque is None else " The torque is what the design foresees."
+    torque = "" if motion.torque is None else " The torque is the one that the design predicts."
     cover = Group(f"cover-group-{k}", covers, (), "two" if robot.n > 2 else "")
     arm = moving_arm(robot, motion, f"arm-{k}")
     return [
@@ -83,7 +83,7 @@ def _limits(context: ExcitationContext) -> list[Block]:
         unit = superscripts(str(each.get("unit", "")))
         rows.append([name(limit), number(each.get("reached")), number(each.get("bound")), unit, used])
     words = Paragraph(
-        "What the motion reaches of each limit, between its samples too; of a position, the share of the way from the middle of the range."
+        "How much of each limit the motion uses, also between its samples; for a position, the share of the distance from the middle of the range to its end."
     )
     return [words, Table(("limit", "reached", "bound", "unit", "used"), rows, (1, 2))] if rows else []
 
@@ -160,7 +160,7 @@ def _cover_figure(robot: Robot, motion: Motion, j: int, place: int, bounds: Mapp
     low, high = max(min(reach), reach[-2] - span), min(max(reach), reach[-1] + span)
     limits = (low - 0.03 * (high - low), high + 0.03 * (high - low))
     plot = Plot(f"position [{length}]", (Panel(f"velocity [{length}/s]", layers, 170),), limits, small=True)
-    title = f"{robot.joints[j]}: what the data will cover"
+    title = f"{robot.joints[j]}: states that the data will cover"
     return single(f"cover-{place}-{j}", title, "", plot, quiet=True)
 
 

@@ -45,7 +45,7 @@ _MOODS = {"changed": "bad", "unchanged": "good"}
 
 
 def _arms(fleet: Fleet) -> list[Block]:
-    """Arms by their need of a look."""
+    """Arms, the most urgent first."""
     rows: list[list[Cell | str]] = []
     for item in fleet.ranked:
         dates = () if item.history is None else item.history.dates
@@ -64,9 +64,10 @@ def _arms(fleet: Fleet) -> list[Block]:
             ]
         )
     words = (
-        f"An arm is named where a change is more than noise: of the arms named a share of {FALSE_CHANGE_LEVEL:g} is wrong on average, and of a "
-        f"fleet in which nothing changed a report names any with a chance of {FALSE_CHANGE_LEVEL:g}. Noise holds what friction, "
-        "torque scale, offset and delay differ by from date to date, as the whole fleet shows it."
+        f"An arm is listed if a change is larger than noise: on average a share of {FALSE_CHANGE_LEVEL:g} of the "
+        f"listed arms is wrong, and if nothing changed in the fleet the probability that a report lists any arm is "
+        f"{FALSE_CHANGE_LEVEL:g}. Noise includes the differences of friction, torque scale, offset and delay from date "
+        f"to date, as estimated from the whole fleet."
     )
     head = ("arm", "verdict", "what changed", "chance", "diagnosis of the last date", "dates", "last", "faults")
     return [Paragraph(words), Table(head, rows, (3, 5, 7))]
@@ -102,9 +103,9 @@ def _over_time(fleet: Fleet) -> list[Block]:
             for slot, plot in enumerate(_plots(fleet, item, None if group == WHOLE_ARM else group)):
                 slots.setdefault(slot, {})[a, g] = plot
     figures = [Figure(f"time-{slot}", "", "", variants, (0, 1), quiet=True) for slot, variants in slots.items()]
-    words = "Bars are ± 2 standard deviations with what differs from date to date. Blue: as on the first date; vermillion: since it changed."
+    words = "Bars are ± 2 standard deviations, including the differences from date to date. Blue: as on the first date; vermillion: since it changed."
     if len(shown) < len(fleet.arms):
-        words += f" Shown are the {len(shown)} arms that need a look most; fleet.parquet has all."
+        words += f" The {len(shown)} most urgent arms are shown; fleet.parquet has all."
     selectors = (Selector("arm", tuple(item.arm for item in shown)), Selector("of", groups))
     return [Paragraph(words), Group("time-group", figures, selectors, "three")]
 
@@ -160,13 +161,13 @@ def _scatter(fleet: Fleet) -> list[Block]:
         rows.append(
             [name(quantity), number(float(middle)), number(float(std), 2), number(spread, 2), Cell(unit, "unit")]
         )
-    words = "Over all arms and dates: the middle value, its standard deviation on one date, and how far arms and dates lie apart."
+    words = "Over all arms and dates: the median, its standard deviation on one date, and the spread of arms and dates."
     head = ("quantity", "median", "std of a date", "spread of the fleet", "unit")
     return [Paragraph(words), Table(head, rows, (1, 2, 3))] if rows else []
 
 
 SECTIONS: tuple[Section, ...] = (
-    NamedSection("arms", "Arms by their need of a look", _arms),
+    NamedSection("arms", "Arms, the most urgent first", _arms),
     NamedSection("time", "Over time", _over_time),
     NamedSection("quantities", "The fleet", _scatter),
     NamedSection("faults", "Faults", _faults),

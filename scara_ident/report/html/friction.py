@@ -90,7 +90,9 @@ def _means(v: Array, partial: Array, low: float, high: float) -> list[Layer]:
         means = binned_means(v[side], partial[side], limits, MEAN_BINS)
         filled = np.isfinite(means.y)
         bars = 2.0 * means.error[filled]
-        found.append(Dots(means.x[filled], means.y[filled], "vermillion", "measured less the rest", bars, 2.0))
+        found.append(
+            Dots(means.x[filled], means.y[filled], "vermillion", "measured minus the rest of the model", bars, 2.0)
+        )
     return found
 
 

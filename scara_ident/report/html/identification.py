@@ -32,11 +32,11 @@ from scara_ident.threads import one_blas_thread
 # Joints whose errors the first sentence lists; of more it gives the range.
 MAX_JOINTS = 3
 SYMBOLS = (
-    "In the meanings m is a mass, mx, my, mz (or m s) are first moments, I is an inertia about the joint's frame, Jm that of "
-    "a rotor, l a length and tau 1 / reduction, numbered by link or joint."
+    "In the column meaning: m is a mass, mx, my, mz (or m s) are first moments, I is an inertia about the joint's "
+    "frame, Jm the inertia of a rotor, l a length and tau 1 / reduction, numbered by link or joint."
 )
 STD_WORDS = {
-    "block": "the scatter of blocks of time, which holds when residuals are correlated",
+    "block": "the scatter of blocks of time, which is valid for correlated residuals",
     "pooled block": "the scatter of few blocks of time, pooled over parameters",
 }
 
@@ -65,7 +65,7 @@ def _prediction(context: IdentificationContext) -> list[Block]:
     )
     return [
         Paragraph(
-            f"Rms residual within the band ({bands}), and as a share of the rms torque: the darker, the larger. A click on a number shows it below."
+            f"Rms residual within the band ({bands}), and as a share of the rms torque; darker is larger. A click on a number shows its recording below."
         ),
         error_table(robot, names, errors),
         torque_group(robot, context.parts, found.bands),
@@ -86,10 +86,10 @@ def _parameters(context: IdentificationContext) -> list[Block]:
     ]
     if isinstance(estimate, ConsistentEstimate):
         words = (
-            "Mass, centre of mass and inertia about it, in the axes of the link. Torque tells their combinations in the table above, "
-            "not each number: the rest is as near to the URDF as the data allow."
+            "Mass, centre of mass and inertia about it, in the axes of the link. The torque determines only the "
+            "combinations in the table above; the rest is as near to the URDF as the data allow."
         )
-        blocks += [Heading("Links of an arm with these parameters"), Paragraph(words), link_table(estimate)]
+        blocks += [Heading("Links with these parameters"), Paragraph(words), link_table(estimate)]
     return blocks
 
 
@@ -108,7 +108,7 @@ def _variation(context: IdentificationContext) -> Sequence[Block]:
 def _friction_curves(context: IdentificationContext) -> list[Block]:
     """Friction over velocity; nothing where the model has none."""
     group = friction_group(context.identification.estimate, context.sets["fitted"])
-    words = "Where the strip below is dark the data hold many samples; beyond it the curve is an extrapolation. The dots are the measured torque, which is the recorded one within the band, less everything but friction, over velocity, ± 2 standard errors."
+    words = "A dark strip below means many samples; outside the strip the curve is extrapolated. Dots: measured torque (recorded torque within the band) minus everything in the model except friction, over velocity, ± 2 standard errors."
     return [] if group is None else [Paragraph(words), group]
 
 
@@ -121,9 +121,9 @@ def _convergence(context: IdentificationContext) -> list[Block]:
     """How the recursive estimate settled."""
     found = context.identification
     history = found.history or cheap_history(found.training)
-    words = "The recursive estimate as samples come in, with two standard deviations for white residuals, which are too small where residuals are correlated; dashed: the final value, dotted: where a recording ends."
+    words = "The recursive estimate over the samples, with two standard deviations for white residuals, which are too small if residuals are correlated. Dashed: the final value; dotted: the end of a recording."
     if found.estimate.method not in ("ols", "rls"):
-        words += f" The recursion is least squares; the method {found.estimate.method} ends elsewhere."
+        words += f" The recursion is least squares; the method {found.estimate.method} has another final value."
     return [Paragraph(words), convergence_group(found.estimate, history, found.training)]
 
 
@@ -173,7 +173,7 @@ def _headline(identification: Identification) -> str:
     shares = [
         (error.relative, joint) for joint, error in zip(robot.joints, errors, strict=True) if error and error.relative
     ]
-    what = "Predicts held-out recordings" if held_out else "Fits its own recordings"
+    what = "Predicts held-out recordings" if held_out else "Fits the training recordings"
     if not shares:
         return f"{identification.model.name} model of {robot.name}."
     if len(shares) > MAX_JOINTS:

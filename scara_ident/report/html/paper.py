@@ -49,7 +49,7 @@ def paper_report(path: Path, report: PaperReport) -> None:
     judged = [check.agrees for check in report.checks if check.agrees is not None]
     verdict = (
         f"{sum(judged)} of {len(judged)} printed figures agree with what is computed.",
-        "What differs is marked; comments say what a figure was computed with.",
+        "Differences are marked; comments say how a figure was computed.",
     )
     title, subtitle = (
         "The paper's tables, printed and computed",

@@ -96,7 +96,7 @@ def correlation_group(estimate: Estimate) -> Group:
     figure = single(
         "correlation",
         "Correlation of the parameters",
-        "Blue: they rise together; vermillion: one rises as the other falls. Strong pairs are told apart only in their sum or difference.",
+        "Blue: both errors have the same sign; vermillion: opposite signs. Of a strongly correlated pair the data determine only the sum or the difference well.",
         Matrix(names, names, values),
     )
     return Group("correlation-group", (figure,))

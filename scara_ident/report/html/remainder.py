@@ -49,8 +49,8 @@ def remainder_group(robot: Robot, remainder: Unexplained, traces: Sequence[Trace
         figures.append(single(f"remainder-{k}", f"{remainder.joint}: what is left over {name}", "", plot))
     if len(signals) == 2:
         words = (
-            f"Mean of the residual [{unit}]; blue: measured torque, the recorded one within the band, is above the prediction, vermillion: below; "
-            "grey: too few samples."
+            f"Mean of the residual [{unit}]. Blue: the measured torque (recorded torque within the band) is above the "
+            f"prediction; vermillion: below; grey: too few samples."
         )
         names = [f"{name} [{length}]" for name, _, length in found]
         matrix = replace(_pair(signals[0], signals[1], y), column_label=names[0], row_label=names[1])

@@ -46,15 +46,15 @@ def residual_blocks(robot: Robot, sets: Sets, bands: Sequence[float | None]) -> 
     still = [joint for j, joint in enumerate(robot.joints) if not any(_turns(robot, s, j) for s in sets.values())]
     which = "any joint" if len(still) == robot.n else ", ".join(still)
     motor = (
-        f" No figure over the motor's angle of {which}: by the reductions given, it turns less than once."
+        f" No figure over the motor angle of {which}: with the given reductions the motor turns less than once."
         if still
         else ""
     )
     return [
         Heading("Against signals"),
         Paragraph(
-            "Blue: how many samples lie where. Vermillion: their mean over the signal, with two standard errors; where it leaves zero, "
-            f"the model lacks something that depends on the signal.{motor}"
+            "Blue: density of the samples. Vermillion: their mean over the signal, ± two standard errors; where the "
+            f"mean is not zero, the model lacks something that depends on the signal.{motor}"
         ),
         _signals_group(robot, sets),
         Heading("By frequency, motor angle and lag"),
@@ -86,21 +86,21 @@ def _spectra_group(robot: Robot, sets: Sets, bands: Sequence[float | None]) -> G
         Figure(
             "frequency",
             "Spectrum over frequency",
-            "Amplitude density of recorded torque, which is the effort in the file times its gain, and of what is left of it, nothing filtered; the area reaches to the highest line of each bin. In the shade, beyond the band, the prediction carries the noise of the position.",
+            "Amplitude density of the recorded torque (the effort in the file times its gain) and of the residual, both unfiltered; the area reaches up to the highest line of each bin. In the grey range, above the band, the prediction contains the noise of the position.",
             by_time,
             (0, 1),
         ),
         Figure(
             "order",
             "Spectrum over the motor's angle",
-            f"What repeats with the motor's turn; noise alone crosses the dashed bound anywhere in 1 of 100 cases. {ORDER_WORDS}",
+            f"The part that repeats with the motor's angle. Noise alone crosses the dashed bound somewhere in 1 of 100 cases. {ORDER_WORDS}",
             by_order,
             (0, 1),
         ),
         Figure(
             "lag",
             "Autocorrelation",
-            "Within the band, from the first lag on (at lag 0 it is 1); white residuals stay between the dashed bounds at 95 % of the lags.",
+            "Within the band, from the first lag on (it is 1 at lag 0). White residuals are between the dashed bounds at 95 % of the lags.",
             by_lag,
             (0, 1),
         ),

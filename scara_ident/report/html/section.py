@@ -95,7 +95,7 @@ class AddedSection:
             reason = " ".join(f"{type(error).__name__}: {error}".split())
             name = type(self.section).__name__
             raise ScaraIdentError(
-                f"report section {self.id!r} of {name} cannot be built ({reason}); mend it"
+                f"report section {self.id!r} of {name} cannot be built ({reason}); correct it"
             ) from error
 
 

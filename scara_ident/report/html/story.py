@@ -41,7 +41,7 @@ SIGNALS: dict[str, tuple[str, str, Callable[[Trace, int], Array]]] = {
     "reversal": ("travel since the last reversal", "{position}", _since_reversal),
 }
 ADDED = "what it adds to the prediction"
-LEFT = "measured less the rest of the model"
+LEFT = "measured minus the rest of the model"
 LAW = "the effect as found"
 # How far after a reversal an effect is shown, in the distances over which it acts.
 SHOWN_DISTANCES = 8.0
@@ -101,7 +101,7 @@ def _telling(robot: Robot, chapter: Chapter) -> Figure | None:
         words += ", in the direction of motion"
     words += "."
     if chapter.own is not None:
-        words += " Above: measured torque, which is the recorded one within the band, less what the rest of the model predicts. Below: the residual; before the effect came in, other parameters had bent to stand for it."
+        words += " Above: measured torque (recorded torque within the band) minus what the rest of the model predicts. Below: the residual; without the effect, other parameters were biased by it."
     return single(name, f"{robot.joints[j]} over {label}", words, plot)
 
 
@@ -121,7 +121,7 @@ def _own(robot: Robot, chapter: Chapter) -> Figure | None:
     ends = [float(np.min(x)), float(np.max(x))]
     layers.append(Line(ends, ends, "black", ADDED, 1.2, "4 3"))
     plot = Plot(f"added to the prediction [{unit}]", (Panel(f"residual [{unit}]", layers, 220),))
-    words = "If the effect is real, the residual before follows the dashed line, and nothing of it is left after."
+    words = "If the effect is real, the residual before follows the dashed line, and the residual after does not depend on it."
     return single(f"effect-{chapter.number}-own", "Residual over what the effect adds", words, plot)
 
 
@@ -193,4 +193,4 @@ def _by_frequency(chapter: Chapter, name: str, unit: str) -> Figure | None:
             return None
         layers.append(Line(found.frequency, found.highest, color, f"residual {words}"))
     plot = Plot("frequency [Hz]", (Panel(f"density [{unit}/√Hz]", layers, 220, log=True),), log=True)
-    return single(name, "Spectrum over frequency", "Highest line of each bin, nothing filtered.", plot)
+    return single(name, "Spectrum over frequency", "Highest line of each bin, unfiltered.", plot)

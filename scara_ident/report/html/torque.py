@@ -21,8 +21,9 @@ MAX_SAMPLES = 1_500_000
 # Times left out that are shorter than this share of a recording are not marked.
 MIN_MARKED = 400
 WORDS = (
-    "Recorded: the effort in the file times its gain, as it is. Measured: the same within the band that the estimate used, as "
-    "is predicted torque. Below, measured less predicted, faded out towards rest as in the estimate."
+    "Recorded: the effort in the file times its gain, unfiltered. Measured: the same within the band that the estimate "
+    "used; predicted torque is in this band too. Below: measured minus predicted, faded out towards rest as in the "
+    "estimate."
 )
 
 

@@ -44,8 +44,9 @@ def _tracking(context: UseContext) -> list[Block]:
         rows.append([name(WORDS[key]), *cells])
     head = ["rms tracking error", *(f"{joint} [{superscripts(units[joint])}]" for joint in context.joints)]
     words = (
-        f"{several(len(result.runs), 'virtual arm')} drawn about the model by its standard deviations: how well a motion of "
-        f"{result.motion.duration:.3g} s, which played no part in the identification, is followed. Bars: share of the PID's own error."
+        f"{several(len(result.runs), 'virtual arm')} with parameters drawn at random from the identified values and "
+        f"their standard deviations follow a motion of {result.motion.duration:.3g} s that was not used in the "
+        f"identification. Bars: rms tracking error as a share of that with the PID alone."
     )
     figures = []
     for j, joint in enumerate(context.joints):
@@ -70,7 +71,7 @@ def _rollouts(context: UseContext) -> list[Block]:
         for horizon, row in errors.items():
             rows.append([name(WORDS[key]), f"{horizon} s", *(number(row[joint]) for joint in context.joints)])
     head = ["simulated", "after", *(f"{joint} [{superscripts(units[joint])}]" for joint in context.joints)]
-    words = "From many states of the recordings the simulated arm moves on with the recorded torque alone; rms distance from where the recorded arm then was."
+    words = "The simulated arm starts from many states of the recordings and moves with the recorded torque alone; shown is its rms distance from the recorded position."
     finite = np.isfinite(next(iter(result.rollouts.values()))).all(axis=1)
     figures = []
     for j, joint in enumerate(context.joints):

@@ -76,13 +76,13 @@ def parse_effect(text: str) -> Effect:
     Parameters
     ----------
     text : str
-        ``NAME``, ``NAME:JOINT``, ``NAME:JOINT:KEY=VALUE,KEY=VALUE`` or ``NAME:KEY=VALUE``; what is left out has a
-        default that suits the arm. A vector is x/y/z; ``recording=NAME`` switches it on in that recording only.
+        ``NAME``, ``NAME:JOINT``, ``NAME:JOINT:KEY=VALUE,KEY=VALUE`` or ``NAME:KEY=VALUE``; values that are not given
+        have defaults that suit the arm. A vector is x/y/z; with ``recording=NAME`` it acts in that recording only.
 
     Raises
     ------
     UsageError
-        An unknown name or key, or a value that is no number; the line lists what there is.
+        If a name or key is unknown, or a value is no number; the message lists the known ones.
 
     Examples
     --------

@@ -77,7 +77,7 @@ def test_an_effect_that_nobody_asked_for_is_left_out_with_a_line(by: float):
 def test_one_that_was_asked_for_is_an_error_of_a_line():
     said = (
         "effect broken of joint1, joint2 cannot be tried: its columns are not finite on B_1, B_2; correct the effect, leave out "
-        "B_1, B_2 or do not ask for it"
+        "B_1, B_2 or leave this effect out"
     )
     with pytest.raises(ScaraIdentError) as raised:
         diagnose(load_robot(), exact_runs(), bands=BANDS, catalogue=(Spring(), Broken("B")))

@@ -48,7 +48,10 @@ def test_a_force_on_the_tool_is_not_believed_to_be_a_base_that_leans(arm: Robot,
     assert not result.effects and result.verdict != "explained"
     (guess,) = result.tentative
     assert guess.effect == "base_tilt"
-    assert guess.why == "a constant force on the tool does as well in its place, and beside it 0% of this is left"
+    assert (
+        guess.why
+        == "a constant force on the tool explains as much in its place, and with it in the model 0% of this effect is left"
+    )
 
 
 @pytest.mark.parametrize("force", [(4.0, -3.0, 0.0), (8.0, -6.0, 5.0)])
@@ -56,7 +59,7 @@ def test_nor_does_a_spring_stand_for_it(arm: Robot, force: tuple[float, float, f
     """Without the tilt, which is refused or would be seen by eye, what a force does all of was left to springs and counterbalances."""
     result = diagnosed(arm, (0.0, 0.0), force, "spring", "gravity_counterbalance")
     assert not result.effects
-    assert "a constant force on the tool does as well in its place" in {item.why for item in result.tentative}
+    assert "a constant force on the tool explains as much in its place" in {item.why for item in result.tentative}
 
 
 def test_a_base_that_leans_is_found_beside_what_a_force_would_do(arm: Robot):

@@ -83,7 +83,7 @@ def test_what_is_mostly_noise_is_not_believed_however_sure_the_rest_is(
     assert significance(left, once.covariance, once.freedom, once.products) < 1e-6
     said = noise_objection(step, decision)
     assert (said is None) == believed
-    assert believed or "the noise of the positions makes it" in said
+    assert believed or "the noise of the positions causes it" in said
 
 
 @pytest.mark.parametrize(
@@ -92,12 +92,12 @@ def test_what_is_mostly_noise_is_not_believed_however_sure_the_rest_is(
         (
             0.05001,
             1e-9,
-            r"over the detection limit: with that taken off, 99\.\d% of it is left, which removes 4\.9\d% of the",
+            r"above the detection limit: without that noise 99\.\d% of it is left, which removes 4\.9\d% of the",
         ),
         (
             0.9,
             1.99e-5,
-            r"surer than it is: .* 99\.\d% of it is left, p = 2\.\de-05 instead of 2\.0e-05; of one of 100 .* 2\.0e-05",
+            r"more significant than it is: .* 99\.\d% of it is left, p = 2\.\de-05 instead of 2\.0e-05; with 100 .* 2\.0e-05",
         ),
         (0.9, 1e-9, None),
         # What was let in below the limit need not be above it.
@@ -107,7 +107,7 @@ def test_what_is_mostly_noise_is_not_believed_however_sure_the_rest_is(
 def test_what_only_just_passes_is_not_believed_for_what_it_fails_by(
     gain: float, p_value: float, said: str | None, monkeypatch: pytest.MonkeyPatch
 ):
-    """Of 99.9 % that was left with p = 5.4e-06 it was said that it could be chance."""
+    """Of 99.9 % that was left with p = 5.4e-06 it was said that it may be chance."""
     once, _ = with_noise_once_and_twice(0.4, 2.0)
     once = replace(once, p_value=p_value)
     noisier = SimpleNamespace(rows=lambda scene, candidates: [None], scene=None, model=None)
@@ -152,7 +152,7 @@ def test_friction_that_is_another_one_where_steps_come_one_by_one_is_not_believe
     stepping = encoder * part.motion.cuts[1]
     (decision,) = step.judge([Candidate(SmoothCoulomb(), Member(1, (share * stepping,)))])
     said = noise_objection(step, decision)
-    assert (f"below {stepping:.2g} rad/s these come one by one" in (said or "")) == hidden
+    assert (f"below {stepping:.2g} rad/s the steps come one by one" in (said or "")) == hidden
 
 
 def test_friction_that_is_another_one_where_a_joint_passes_within_a_sample_is_not_believed() -> None:
@@ -165,7 +165,7 @@ def test_friction_that_is_another_one_where_a_joint_passes_within_a_sample_is_no
     assert len(changes) and passed > 0.0
     for share, hidden in ((0.8, True), (1.3, False)):
         (decision,) = step.judge([Candidate(SmoothCoulomb(), Member(1, (share * passed,)))])
-        assert ("passes within a sample" in (noise_objection(step, decision) or "")) == hidden
+        assert ("passes that speed within one sample" in (noise_objection(step, decision) or "")) == hidden
 
 
 def answering(runs: list[Recording], gains: dict[int, float], size: float) -> list[Recording]:
@@ -200,7 +200,7 @@ def test_a_delay_is_about_the_same_in_the_lower_part_of_the_band(recorded, joint
     assert decision.accepted
     said = noise_objection(step, decision)
     assert (said is None) == there
-    assert there or ("Hz" in said and "where one that is there is the same" in said)
+    assert there or ("Hz" in said and "a real one would have the same" in said)
 
 
 def test_a_delay_behind_noisy_positions_is_what_it_is_once_nothing_is_left_of_it():
@@ -271,7 +271,7 @@ def test_what_noise_in_positions_and_torque_could_make_has_to_be_there_further_d
     assert 0.1 < decision.gain <= share
     said = noise_objection(step, decision)
     assert said is not None
-    assert "what a controller answers it with: below 8.8 Hz it is" in said
+    assert "through the controller's reaction: below 8.8 Hz it has" in said
     # What removes more is not asked, as noise could not make it.
     assert noise_objection(step, replace(decision, gain=1.01 * share)) is None
 

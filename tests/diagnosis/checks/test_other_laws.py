@@ -63,7 +63,7 @@ def test_where_two_laws_explain_as_much_parameters_are_no_surer_than_what_they_d
     assert told["amplitude"].std > 0.5 * abs(other["amplitude"].value - own["amplitude"].value)
 
 
-def test_what_laws_differ_by_is_in_every_number_that_is_told_twice():
+def test_what_laws_differ_by_is_in_every_number_that_is_determined_twice():
     """An effect beside was told by a standard deviation that lacked what the laws of the other moved it by."""
     noise = 20.0
     step = step_of(runs_by(2, noise), 2, noise)
@@ -150,7 +150,7 @@ def warming_runs(part: str) -> list[Recording]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("part", ["all", "coulomb", "viscous"])
-def test_what_of_the_friction_warms_up_is_told(part: str):
+def test_what_of_the_friction_warms_up_is_determined(part: str):
     """Of Coulomb friction alone a share of 0.41 +- 0.01 of all friction was said, and steady friction 8.6 deviations off."""
     found = diagnose(load_robot(), warming_runs(part), bands=BANDS, catalogue=(WarmUp(),))
     (effect,) = found.effects

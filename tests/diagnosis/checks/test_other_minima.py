@@ -151,7 +151,7 @@ def test_the_lower_part_of_the_band_ends_where_what_lags_has_no_noise(monkeypatc
 
 
 @pytest.mark.parametrize("count", [1, 2])
-def test_what_noise_moves_is_told_from_where_there_is_none(count: int, monkeypatch: pytest.MonkeyPatch):
+def test_what_noise_moves_is_determined_where_there_is_none(count: int, monkeypatch: pytest.MonkeyPatch):
     """Three gears of 12, 15 and 6 kN m/rad were 10.5 +- 2, 14.3 +- 0.6 and 6.7 +- 0.4; below 5 Hz 12.0 +- 0.1, 15.0 +- 0.4 and 6.2 +- 0.2.
 
     One of 6679 was 6690 +- 46 in 13 Hz and 6159 +- 71 below 5 Hz, which no noise had to do with.
@@ -192,7 +192,7 @@ def test_what_one_takes_up_of_another_that_was_not_found_is_in_its_standard_devi
     assert abs(told["stiffness"].value - 6000.0) < 2.0 * told["stiffness"].std
 
 
-def test_what_ended_in_the_same_minimum_is_no_rival(monkeypatch: pytest.MonkeyPatch):
+def test_what_ended_in_the_same_minimum_is_no_confounder(monkeypatch: pytest.MonkeyPatch):
     step = step_beside(exact_runs(1, 1), [Candidate(FAMILY, Member(j, (9.0 - j, 0.1))) for j in (0, 1)])
 
     def tuned(step: SelectionStep, **_: bool) -> SelectionStep:

@@ -126,11 +126,11 @@ def test_only_what_leaves_a_rest_objects(soft: Diagnosis):
     # A rest that does all that the gear does leaves nothing to it.
     why = remainder_objection(replace(beside, rest=Candidate(SameTorque(), step.chosen[gear].member)), decision)
     assert why is not None
-    assert why.startswith("a torque of the same kind does as well in its place, and beside it")
+    assert why.startswith("a torque of the same kind explains as much in its place, and with it in the model")
 
 
 @pytest.mark.slow
-def test_a_gear_beside_a_mean_over_60_ms_is_not_told_wrong():
+def test_a_gear_beside_a_mean_over_60_ms_is_not_reported_wrong():
     """The first joint's gear seemed to have twice its stiffness, 24300 +- 1500 N m/rad; up to a fifth over the delay, 56,400, and the second one."""
     found = diagnosed(["joint_elasticity:joint1:stiffness=12000"], 15)
     assert [item.effect for item in found.effects] == ["time_delay"]
@@ -173,10 +173,16 @@ def test_what_a_rest_leaves_too_little_of_to_come_in_is_refused_whatever_the_res
         )
         return remainder_objection(Step(left, accepted), gear)
 
-    assert objection(0.31, accepted=False, in_place=0.6) == "beside a filter 31% of this is left: not significant"
+    assert (
+        objection(0.31, accepted=False, in_place=0.6)
+        == "with a filter in the model, 31% of this effect is left: not significant"
+    )
     assert objection(0.31, accepted=True, in_place=0.6) is None
     assert objection(0.6, accepted=False, in_place=0.6) is None
-    assert "does as well in its place" in objection(0.05, accepted=True, in_place=0.9)
+    assert "explains as much in its place" in objection(0.05, accepted=True, in_place=0.9)
     # Of a rigid UR10 behind a lag of 8 ms a gear of 270,000 N m/rad came in by 57 % of what it did alone, of which a filter did more.
-    assert objection(0.57, accepted=False, in_place=1.2) == "beside a filter 57% of this is left: not significant"
+    assert (
+        objection(0.57, accepted=False, in_place=1.2)
+        == "with a filter in the model, 57% of this effect is left: not significant"
+    )
     assert objection(0.57, accepted=True, in_place=1.2) is None

@@ -45,7 +45,7 @@ def diagnosed(**steps: float) -> Diagnosis:
 def test_beside_efforts_as_exact_it_is_found_with_what_else_it_may_be():
     (found,) = diagnosed().effects
     assert (found.effect, found.joint) == ("presliding", "joint1")
-    assert "should they be setpoints, it is what the controller lags by" in found.description
+    assert "if they are setpoints, this is the lag of the controller" in found.description
 
 
 def test_beside_efforts_in_steps_it_is_not_believed():

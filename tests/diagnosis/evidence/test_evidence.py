@@ -124,7 +124,9 @@ def test_one_short_run_cannot_tell():
     assert result.verdict == "undecided"
     assert not result.effects
     # `no effect would have been significant` was said beside effects that had been found.
-    assert any("nothing missing" in item.why and "would have been significant" in item.why for item in result.evidence)
+    assert any(
+        "no missing effect" in item.why and "would have been significant" in item.why for item in result.evidence
+    )
 
 
 def test_what_a_right_model_lacks_on_others_is_what_its_parameters_make_there():
@@ -148,7 +150,7 @@ def test_what_does_not_hold_on_other_recordings_is_not_shown():
     # What parameters that are not sure make there speaks against no model, and is said.
     found = held_out_evidence(shown, (1.0, 1.0), (1.4, 6.0), np.array([0.0, 6.0]), sure)
     assert all(item.shown for item in found)
-    assert "6 times" in found[1].why and found[1].why.endswith("as unsure as the parameters are there")
+    assert "6 times" in found[1].why and found[1].why.endswith("which the uncertainty of the parameters there explains")
     # Nor what runs differ by: two standard deviations of one draw.
     for apart, holds in ((3.0, True), (2.5, False)):
         found = held_out_evidence(shown, (1.0, 1.0), (1.4, 6.0), sure, np.array([0.0, apart]))
@@ -180,8 +182,8 @@ def test_what_is_white_and_repeats_above_the_noise_is_no_noise(nothing_missing, 
     found = evidence(nothing_missing.search, residuals, fit, (0.48, 0.48), (of_positions,) * 2)
     assert [(item.shown, item.by) for item in found] == 2 * [(shown, "whiteness" if shown else "repetition")]
     said = (
-        "0.376 N m repeats from run to run (p = 5.0e-22) beside 0.07 N m that does not: no noise, even where it is white, but "
-        "filters and encoders may leave as much, so this alone does not say that the model lacks something"
+        "0.376 N m repeats from run to run (p = 5.0e-22), 0.07 N m does not; this is not noise, even if it is white, "
+        "but filters and encoders may cause as much, so this alone does not say that the model lacks something"
     )
     assert (found[0].why == said) != shown
     assert not any(item.lacks for item in found)
@@ -208,7 +210,7 @@ def test_the_noise_of_positions_speaks_of_the_joints_alone_that_it_colours(nothi
     )
     assert [item.shown for item in without] == [False, True]
     assert [item.shown for item in within] == [True, True]
-    assert "that of the positions" in within[0].why and within[1] == without[1]
+    assert "the noise of the positions" in within[0].why and within[1] == without[1]
 
 
 @pytest.mark.parametrize(
@@ -223,7 +225,7 @@ def test_what_is_far_above_the_noise_is_doubted_where_it_is_hardly_shown_to_repe
 
 @pytest.mark.parametrize(("limit", "said"), [(0.984, True), (0.997, False), (1.0, False)])
 def test_a_limit_that_is_all_but_the_whole_residual_is_not_found_as_its_share(limit, said):
-    """`nothing missing that makes less than 100% of the squared residual` says nothing."""
+    """`no missing effect that makes less than 100% of the squared residual` says nothing."""
     found = _of_joint("joint1", "N m", None, 0.05, "white noise", limit, (0.0, 0.0, CRITERIA.far_above_noise), CRITERIA)
     assert ("that makes less than 98% of the squared residual" in found.why) is said
-    assert found.why.startswith("nothing missing would have been significant") is not said
+    assert found.why.startswith("no missing effect would have been significant") is not said

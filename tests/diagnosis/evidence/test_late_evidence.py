@@ -44,7 +44,7 @@ def test_a_delay_of_all_runs_is_no_noise(delays: list[float], passes: bool):
     assert [item.shown for item in shown] == [passes, passes]
     if not passes:
         word = "lags" if delays[0] > 0.0 else "leads"
-        assert shown[0].why.startswith(f"it {word} by 1") and "in all runs alike" in shown[0].why
+        assert shown[0].why.startswith(f"it {word} by 1") and "in all runs" in shown[0].why
 
 
 def test_without_an_effect_that_stands_for_it_nothing_is_complete():

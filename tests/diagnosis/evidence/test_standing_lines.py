@@ -63,7 +63,7 @@ def test_a_line_of_any_phase_is_no_noise_and_named():
     assert first.shown
     assert not second.shown
     assert re.search(
-        r"a line of 0\.0(49|5)\d* N m at 7\.30\d Hz, which is no noise and has no phase that all", second.why
+        r"a spectral line of 0\.0(49|5)\d* N m at 7\.30\d Hz, which is not noise, and has another phase", second.why
     )
     (tentative,) = found.tentative
     assert (tentative.effect, tentative.joint, tentative.settled_by) == ("vibration", "joint2", Vibration.experiment)
@@ -141,6 +141,6 @@ def test_what_is_known_is_not_listed_again():
 def test_at_one_amplitude_the_sentence_says_what_and_what_to_do():
     say: Callable[..., str] = StandingLine(0, 40.0, 0.2, 900.0, False, 0.0).sentence
     assert say("N m", 17.1) == (
-        "above the band of 17.1 Hz there is a line of 0.2 N m at 40 Hz, which is no noise, larger than all that is left "
-        "within: give a wider band"
+        "above the band of 17.1 Hz there is a spectral line of 0.2 N m at 40 Hz, which is not noise, and is larger than all that is left "
+        "within the band: give a wider band"
     )

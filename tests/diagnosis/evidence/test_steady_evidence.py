@@ -47,10 +47,10 @@ def test_what_changes_within_recordings_is_no_noise(kind: str, period: float):
     first, second = told(changing(0.05, period, kind=kind))
     assert first.shown
     assert not second.shown
-    assert "changes within recordings as if its " in second.why
+    assert "varies within recordings as if its " in second.why
     # Within seconds a joint goes one way, and its friction is an offset.
-    assert period < 9.0 or f"its {kind} changed (standard deviation 0." in second.why
-    assert second.why.endswith("another way in each")
+    assert period < 9.0 or f"its {kind} changed during each recording (standard deviation 0." in second.why
+    assert second.why.endswith("differently in each")
 
 
 def test_a_little_of_it_is_let_pass():

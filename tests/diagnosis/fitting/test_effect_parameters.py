@@ -62,7 +62,7 @@ def stribeck_runs():
     return with_torque(exact_runs(), 0, added)
 
 
-def test_what_changes_with_a_coefficient_that_is_left_open_is_not_told():
+def test_what_changes_with_a_coefficient_that_is_left_open_is_not_determined():
     """The rest of a gas spring on a vertical axis was -0.21 m to half a millimetre, where 0 was true: weight is a preload too."""
     scene, candidate = without_offset(scene_of(load_robot())), Candidate(Spring(), Member(1))
     # What a generalized inverse leaves of a coefficient that is open.
@@ -196,7 +196,7 @@ def test_coefficients_are_at_least_what_their_uncertainty_leaves():
 
 
 @pytest.mark.parametrize(("std", "told"), [(0.01, True), (0.03, False)])
-def test_a_size_is_told_where_it_differs_from_none_whatever_the_other_parameters(std: float, told: bool):
+def test_a_size_is_determined_where_it_differs_from_none_whatever_the_other_parameters(std: float, told: bool):
     parameters = {"amplitude": Parameter(AMPLITUDE, std, "N m"), "velocity": Parameter(VELOCITY, 0.01, "rad/s")}
     assert size_is_determined(Stribeck(), parameters, 2.5) is told
 
@@ -239,7 +239,7 @@ def test_a_tilt_is_as_unsure_as_the_masses_that_it_pulls_at(tmp_path: Path):
 
 
 @pytest.mark.slow
-def test_what_a_gear_loses_is_told_where_one_parameter_is_its_load(tmp_path: Path):
+def test_what_a_gear_loses_is_determined_where_one_parameter_is_its_load(tmp_path: Path):
     """Of a lift the gain that goes with the loss is one with its mass: free, it left open how large the loss is."""
     robot = load_robot(write_urdf(tmp_path / "lift.urdf", (Link("prismatic", mass=20.0),)))
     share, time = 0.15, np.arange(3000) / 250.0

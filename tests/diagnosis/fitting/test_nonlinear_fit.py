@@ -97,7 +97,7 @@ def test_a_large_loss_shows_the_rotor_behind_the_gear() -> None:
     assert abs(biased - 0.3) > 8.0 * loss.std
 
 
-def test_what_is_told_of_a_loss_is_what_the_fit_has_from_wherever_it_began() -> None:
+def test_what_is_determined_of_a_loss_is_what_the_fit_has_from_wherever_it_began() -> None:
     """Its gain was free in the fit: beside a loss of 0.297 it was that of one of 0.284."""
     for runs in (loss_runs(0.3, 1.0), loss_runs(0.0, 1.0)):
         ends = []
@@ -173,7 +173,7 @@ def ur5_runs(armature: float):
 
 
 @pytest.mark.parametrize("armature", [1.2, 4.0])
-def test_a_rotor_that_nobody_stated_is_told_by_the_loads_and_leaves_no_false_friction(armature: float) -> None:
+def test_a_rotor_that_nobody_stated_is_determined_by_the_loads_and_leaves_no_false_friction(armature: float) -> None:
     """Taken as zero it made the losses 0.036 and 0.049 instead of 0.07 and 0.10, and friction over position of 0.2."""
     robot, runs = ur5_runs(armature)
     families = effects_named("transmission_loss", "position_dependent_friction")

@@ -73,8 +73,10 @@ def test_a_held_out_recording_says_by_its_first_third_how_late_it_is(scale: floa
     assert [note.partition(":")[0] for note in said[:2]] == ["R10_1", "R11_1"]
     # Four seconds of slow motion: drawn to the mean by up to a half of the 4.7 ms that recordings differ by.
     assert_allclose([float(note.split()[2]) for note in said[:2]], HELD_OUT, atol=2e-3)
-    assert any(note.startswith("R20_1: its first third is too short to show its delay") for note in result(scale).notes)
-    assert "errors held out are of the other two thirds" in result(scale).notes
+    assert any(
+        note.startswith("R20_1: its first third is too short to determine its delay") for note in result(scale).notes
+    )
+    assert "held-out errors are of the other two thirds" in result(scale).notes
 
 
 def test_with_all_delays_corrected_what_is_left_of_held_out_recordings_is_noise():

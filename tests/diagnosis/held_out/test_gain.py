@@ -78,8 +78,8 @@ def test_an_effect_that_is_there_in_both_removes_most_of_what_is_held_out(effect
     assert f"no choice has seen, it removes {item.held_out.share:.0%}; {words_of(item.held_out, 'N m')}." in said
     summary = diagnosis_dict(result)["summary"]
     (line,) = [line for line in summary if line.startswith(f"Found {item.effect}")]
-    assert line.endswith(f"; {shown_of(item.held_out)} on the recordings held out.")
-    assert not any("by the recordings held out" in line for line in summary)
+    assert line.endswith(f"; {shown_of(item.held_out)} on the held-out recordings.")
+    assert not any("by the held-out recordings" in line for line in summary)
 
 
 def without_offsets(held: Observations, after: Estimate, joint: int, signal: Array) -> Array:
@@ -196,11 +196,11 @@ def test_one_that_is_not_there_in_what_is_held_out_is_in_doubt():
     words = words_of(gain, "N m")
     assert (
         content["summary"][place + 1]
-        == f"Not borne out by the recordings held out: {words}; record further motions to fit."
+        == f"Not borne out by the held-out recordings: {words}; record more motions to fit."
     )
     assert [item["held_out"] for item in content["effects"]] == [gain.entry()]
     said = repr(_effect_words(result.effects[0], DiagnosisContext(result))[0])
-    assert f"It is not borne out by the recordings held out: {words}." in said
+    assert f"It is not borne out by the held-out recordings: {words}." in said
 
 
 def test_it_is_not_what_the_model_lacked():
@@ -221,7 +221,7 @@ def test_what_is_left_is_not_called_noise_then(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(module, "held_out_gains", lambda *_: {usual.effects[0].label: gain})
     result = found.__wrapped__(UNEVEN, UNEVEN)
     assert not result.evidence[0].shown
-    assert result.evidence[0].why.endswith("of position_dependent_friction of joint1 shows on the recordings held out")
+    assert result.evidence[0].why.endswith("of position_dependent_friction of joint1 shows on the held-out recordings")
     assert result.verdict == "undecided"
 
 
@@ -241,7 +241,7 @@ def test_what_was_shown_is_taken_back_on_the_joint_that_is_worse_and_only_there(
     one, other = spoken_against(shown, {"spring of joint1": worse, "base_tilt": unsure})
     assert one == shown[0]
     assert (other.shown, other.by) == (False, "")
-    assert other.why == "10 ± 10 % of spring of joint1 shows on the recordings held out"
+    assert other.why == "10 ± 10 % of spring of joint1 shows on the held-out recordings"
 
 
 @pytest.mark.parametrize(
@@ -288,8 +288,8 @@ def test_one_that_is_neither_shown_nor_refuted_is_said_to_be_unconfirmed():
     unsure = replace(result, effects=(replace(result.effects[0], held_out=gain),))
     summary = diagnosis_dict(unsure)["summary"]
     assert any(line.startswith("Found position_dependent_friction") for line in summary)
-    assert f"Not confirmed by the recordings held out: {words_of(gain, 'N m')}." in summary
-    assert "It is not confirmed by the recordings held out: 60 ± 40 % of it shows" in repr(
+    assert f"Not confirmed by the held-out recordings: {words_of(gain, 'N m')}." in summary
+    assert "It is not confirmed by the held-out recordings: 60 ± 40 % of it shows" in repr(
         _effect_words(unsure.effects[0], DiagnosisContext(unsure))[0]
     )
 

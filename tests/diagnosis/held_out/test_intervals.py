@@ -37,7 +37,7 @@ def told(robots: tuple[Robot, Robot], held_out: Recording) -> tuple[tuple[Interv
     return intervals_by_others(one, scene, chosen, 0, after.value, after.weights)
 
 
-def test_each_joint_is_told_by_the_others(robots: tuple[Robot, Robot]):
+def test_each_joint_is_determined_by_the_others(robots: tuple[Robot, Robot]):
     apart, together = told(robots, run(robots, 7, SPELLS))
     for joint in (None, 0, 1):
         own = [item for item in (*apart, *together) if item.joint == joint]

@@ -36,10 +36,10 @@ def found() -> tuple[Search, Estimate]:
     return result, wls(observed_at_every_sample(result.step))
 
 
-def test_a_payload_is_told_by_the_first_part_and_errors_are_of_the_rest():
+def test_a_payload_is_recognised_by_the_first_part_and_errors_are_of_the_rest():
     result, after = found()
     (effect,) = result.chosen
-    assert effect.effect.description(result.scene, effect.member) == "a payload in r_1, r_3, not in the others"
+    assert effect.effect.description(result.scene, effect.member) == "a payload in r_1, r_3 and not in the others"
     held = prepare(runs(1.5, 0.0, first=10), BANDS)
     states = held_out_states(result, after, held)
     (now,) = states.chosen

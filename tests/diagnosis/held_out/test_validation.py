@@ -84,7 +84,7 @@ def test_the_base_model_is_predicted_beside_it():
 
 
 def test_of_one_recording_runs_are_not_known_to_differ():
-    """`complete` with 9 times the error on what was held out, "as runs were found to differ": one run, and no number to compare with."""
+    """`complete` with 9 times the error on what was held out, "which the differences between runs explain": one run, and no number to compare with."""
     arm = replace(virtual_arm(), torque_noise=np.array(NOISE))
     fitted, other = (
         simulate(arm, multisine(f"m{seed}", seed, 30.0, 0.8), seed=seed, rate=250.0).recording for seed in (2, 7)
@@ -99,13 +99,13 @@ def test_of_one_recording_runs_are_not_known_to_differ():
         bands=BANDS,
         catalogue=(PositionDependentFriction(),),
     )
-    assert all("times that of the training" in item.why for item in result.evidence)
+    assert all("times the training error" in item.why for item in result.evidence)
     assert result.verdict == "undecided"
 
 
 @pytest.mark.slow
 def test_what_runs_differ_by_excuses_no_error_that_is_none_of_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    """`complete` stood beside 2.9 times the training's error, "as runs were found to differ": in delays, of which it was none."""
+    """`complete` stood beside 2.9 times the training's error, "which the differences between runs explain": in delays, of which it was none."""
     seen: list[Validation] = []
 
     def kept(outcome: Outcome, data: PreparedData) -> Validation:

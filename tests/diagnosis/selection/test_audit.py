@@ -91,7 +91,7 @@ def test_a_spring_of_the_arm_stands(monkeypatch: pytest.MonkeyPatch):
     proxy = replace(found, step=replace(found.step, chosen=(other.candidate,)))
     (fallen,) = outdone(proxy, found.step.weights, (other.refused(""), held.refused("")))
     assert (fallen.label, fallen.accepted, fallen.tentative) == (other.label, False, True)
-    assert fallen.why == "spring of joint2, which is not believed, does as well in its place"
+    assert fallen.why == "spring of joint2, which is not believed, explains as much in its place"
     # What turns within a step of the encoder is no rival: nothing real was refused.
     monkeypatch.setattr(audit, "within_a_step", lambda step, candidate: "less than a step")
     assert outdone(proxy, found.step.weights, (held.refused(""),)) == []
@@ -122,7 +122,7 @@ class SpringTogether(Spring):
 
 
 @pytest.mark.slow
-def test_of_those_that_act_together_one_whose_size_is_not_told_falls(monkeypatch: pytest.MonkeyPatch):
+def test_of_those_that_act_together_one_whose_size_is_not_determined_falls(monkeypatch: pytest.MonkeyPatch):
     made = exact_runs()
     for joint in (0, 1):
         made = with_torque(made, joint, lambda motion, joint=joint: 0.3 * motion.q[joint])
@@ -235,7 +235,10 @@ def test_what_recordings_hold_too_little_of_refuses_what_stands_for_it():
         assert [item.label for item in others] == ["wave of joint1"] * superseded
         refused = superfluous(found, found.step.weights, others)
         assert [(item.label, item.tentative) for item in refused] == [("spring of joint1", True)] * superseded
-        assert all(item.why.startswith("a wave, of which") for item in refused)
+        assert all(
+            item.why.startswith("a wave explains more in its place, but the recordings excite it too little")
+            for item in refused
+        )
 
 
 def test_an_effect_beside_it_stays():
@@ -248,7 +251,7 @@ def test_an_effect_beside_it_stays():
 
 
 @pytest.mark.slow
-def test_a_ripple_of_too_few_periods_is_told_and_not_believed():
+def test_a_ripple_of_too_few_periods_is_reported_and_not_believed():
     # Once per turn of a joint whose gear is not known, of which the motion has 0.6 turns: a spring takes its place.
     robot = replace(load_robot(), reduction=np.ones(2))
     made = with_torque(exact_runs(), 0, lambda motion: 0.3 * np.sin(motion.q[0] - 1.57))
@@ -366,6 +369,6 @@ def test_what_no_arm_has_refuses_what_stands_for_it(share: float, believed: bool
     refused = beaten_by_impossible(found, found.step.weights)
     assert [item.label for item in refused] == ([] if believed else ["spring of joint1"])
     if not believed:
-        assert refused[0].why == "impossible of joint1 explains more in its place, and is none: no arm has it"
+        assert refused[0].why == "impossible of joint1 explains more in its place, but is impossible: no arm has it"
         assert not refused[0].accepted
     assert beaten_by_impossible(found.without(["spring of joint1"]), found.step.weights) == []

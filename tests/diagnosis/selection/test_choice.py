@@ -168,7 +168,7 @@ def test_what_all_runs_take_up_at_one_time_is_no_list_of_intervals(last: float, 
 
 
 @pytest.mark.parametrize("alike", [True, False])
-def test_a_law_is_that_of_the_name_unless_it_is_told(alike: bool, monkeypatch):
+def test_a_law_is_that_of_the_name_unless_it_is_reported(alike: bool, monkeypatch):
     """Of a gallery's gear with an efficiency the loss was by the law without, which left next to nothing less."""
     monkeypatch.setattr(sys.modules[choose.__module__], "same", lambda own, other: alike)
     laws = [(TransmissionLoss(1), "a1"), (TransmissionLoss(), "a2"), (Spring(), "b1"), (TransmissionLoss(), "a1")]
@@ -187,7 +187,7 @@ def test_little_of_a_delay_is_left_once_it_is_taken_out(left: float, there: bool
     monkeypatch.setattr(sys.modules[fitted_beside.__module__], "taken_out", lambda step, _: (step.columns, whole))
     said = _left_again(step, decision)
     assert (said is None) == there
-    assert there or "until nothing of it is left in the data" in said
+    assert there or "removed from the data until nothing of it is left" in said
     # Of what stays in the model nothing is taken out.
     (spring,) = step.judge([Candidate(Spring(), Member(1))])
     assert _left_again(step, spring) is None
@@ -206,7 +206,7 @@ def test_what_noise_of_positions_hides_of_a_delay_may_be_left_once_it_is_taken_o
     # Without noise in the column as much is left of nothing that is there.
     clean = replace(step)
     clean.__dict__["noisier"] = step
-    assert "until nothing of it is left in the data" in (_left_again(clean, decision) or "")
+    assert "removed from the data until nothing of it is left" in (_left_again(clean, decision) or "")
 
 
 @pytest.mark.slow

@@ -69,7 +69,7 @@ def test_a_spring_and_a_pendulum_are_one_on_a_small_range():
         assert all(abs(share - 1.0) < 0.05 for share in others.values())
 
 
-def test_a_rival_is_named_however_many_others_were_tried():
+def test_a_confounder_is_named_however_many_others_were_tried():
     result = searched(with_torque(exact_runs(size=0.3), 0, spring), Spring(), Pendulum())
     # So many that neither would be believed.
     step = replace(result.step, tried=10**250)
@@ -83,11 +83,11 @@ def test_on_a_large_range_each_stands_alone():
     assert pendulum == {"pendulum of joint1": {}}
 
 
-def test_an_effect_of_another_kind_is_no_rival():
+def test_an_effect_of_another_kind_is_no_confounder():
     assert groups(1.9, lambda motion: 0.03 * np.abs(motion.v[0])) == {"asymmetric_friction of joint1": {}}
 
 
-def test_two_effects_at_once_are_not_rivals_of_each_other():
+def test_two_effects_at_once_are_not_confounders_of_each_other():
     both = groups(1.9, lambda motion: spring(motion) + 0.03 * np.abs(motion.v[0]))
     assert both == {"spring of joint1": {}, "asymmetric_friction of joint1": {}}
 
@@ -123,7 +123,7 @@ def test_what_recordings_hold_too_little_of_is_named_as_it_is():
         assert all(item.candidate.member.nonlinear == (1.0,) for item in others)
 
 
-def test_two_that_nearly_cancel_are_not_told_apart():
+def test_two_that_nearly_cancel_are_not_distinguished():
     """A cubic spring was a spring and a counterbalance, each of five times its torque, and surely so."""
 
     def cubic(motion):
@@ -179,7 +179,7 @@ class OfTheArm(Spring):
         return [np.array([turn, np.zeros_like(turn)])]
 
 
-def test_a_rival_of_the_whole_arm_is_named_where_it_removes_little_of_what_all_joints_leave():
+def test_a_confounder_of_the_whole_arm_is_named_where_it_removes_little_of_what_all_joints_leave():
     step = searched(with_torque(exact_runs(), 0, lambda motion: 0.0023 * (motion.q[0] - MIDDLE)), Spring()).step
     (own,) = step.without(0).judge(step.chosen)
     beside = step.without(0).judge([Candidate(OfTheArm(), Member(None))])
@@ -266,7 +266,7 @@ class FittedBump(KnownBump):
         return (Member(0, (1.35,)),)
 
 
-def test_a_rival_that_a_fit_chooses_is_compared_by_its_fit():
+def test_a_confounder_that_a_fit_chooses_is_compared_by_its_fit():
     runs = with_torque(exact_runs(size=1.9), 0, lambda motion: 0.2 * np.exp(-(((motion.q[0] - 1.15) / 0.3) ** 2)))
     step = searched(runs, KnownBump()).step
     rival = Candidate(FittedBump(), Member(0, (1.35,)))

@@ -39,7 +39,7 @@ def test_it_stands_in_the_results_as_the_contract_says(doubtful):
     content = diagnosis_dict(doubtful)
     (entry,) = content["tentative"]
     assert {"effect", "joint", "why", "settled_by"} <= set(entry)
-    said = f"Worth a look, not added: spring on joint2, would remove {entry['gain']:.0%} of the squared residual; helps in only"
+    said = f"Worth a look, not added: spring on joint2, would remove {entry['gain']:.0%} of the squared residual; in cross-validation it helps in only"
     assert any(said in sentence for sentence in content["summary"])
 
 
@@ -51,7 +51,7 @@ def test_what_is_believed_is_not_listed_again(doubtful):
 def test_what_noise_may_make_is_settled_by_less_of_it(doubtful, by_noise: bool):
     """An elastic joint, of which noise made all, was to be settled by motions that show as much of the noise."""
     (decision,) = (item.decision for item in doubtful.tentative)
-    why = f"{BY_NOISE if by_noise else 'chance'} makes it: with that taken off 0% of it is left, p = 6.1e-01"
+    why = f"{BY_NOISE if by_noise else 'chance'} causes it: without that noise 0% of it is left, p = 6.1e-01"
     (spring,) = tentative_effects(doubtful.search, [decision.refused(why)], ())
     assert spring.settled_by == (LESS_NOISE if by_noise else Spring.experiment)
 
@@ -60,11 +60,11 @@ def test_what_noise_may_make_is_settled_by_less_of_it(doubtful, by_noise: bool):
     ("size", "step", "said"),
     [
         # Moved well: steps are the limit, or nothing that has any.
-        (1.9, 1e-3, "record positions with a finer encoder than one of steps of 0.001 rad on joint2"),
+        (1.9, 1e-3, "record positions with a finer encoder: the steps are 0.001 rad on joint2"),
         (1.9, 0.0, LESS_NOISE),
         # A finer encoder was asked for here too.
-        (0.05, 1e-3, "move joint2 further and faster: it moved by {travel:.2g} rad of {reach:.2g} rad, {steps:.2g} steps of its encoder of 0.001 rad"),
-        (0.05, 0.0, "move joint2 further and faster: it moved by {travel:.2g} rad of {reach:.2g} rad, beside noise of "),
+        (0.05, 1e-3, "move joint2 further and faster: it moved by {travel:.2g} rad of {reach:.2g} rad, which is {steps:.2g} encoder steps of 0.001 rad"),
+        (0.05, 0.0, "move joint2 further and faster: it moved by {travel:.2g} rad of {reach:.2g} rad, with position noise of "),
     ],
 )  # fmt: skip
 def test_a_joint_that_hardly_moves_is_to_be_moved_before_its_encoder_is_to_be_finer(

@@ -41,7 +41,7 @@ def decided(candidate: Candidate, item: Examination, tried: int, gain: float = 0
     return decide(candidate, item, gain, SCENE, tried, CRITERIA)
 
 
-def test_a_good_candidate_comes_in_and_its_gain_is_told():
+def test_a_good_candidate_comes_in_and_its_gain_is_reported():
     decision = decided(SPRING, GOOD, 100)
     assert decision.accepted
     assert decision.gain == pytest.approx(0.4)
@@ -54,7 +54,7 @@ def test_a_good_candidate_comes_in_and_its_gain_is_told():
     [
         ({"outside": 1e-9}, "absorbs"),
         ({"outside": 1e-4}, "lies outside the model"),
-        ({"p_value": 2.0 * CRITERIA.family_error / 100}, "could be chance"),
+        ({"p_value": 2.0 * CRITERIA.family_error / 100}, "may be chance"),
         ({"value": np.array([-0.05, 0.0])}, "push away"),
         ({"fold_gains": (0.5, -0.1, 0.2, None)}, "helps in only 2 of 3"),
     ],
@@ -83,12 +83,10 @@ def test_the_p_value_is_corrected_for_what_was_tried():
 def test_what_is_worth_a_look_may_be_chance_and_is_not_said_to_have_a_p_value_of_one():
     look = decided(SPRING, replace(GOOD, p_value=0.008), 200)
     assert look.tentative
-    assert look.why == (
-        "could be chance: one of 200 candidates tried; p = 8.0e-03 of it alone, 1.0e-05 is asked of one of so many"
-    )
+    assert look.why == ("may be chance: p = 8.0e-03 by itself, but with 200 candidates tried 1.0e-05 is required")
     other = decided(SPRING, replace(GOOD, p_value=0.02), 20)
     assert not other.tentative
-    assert other.why == "not significant: p = 4.0e-01 over the 20 candidates tried, 0.002 is asked"
+    assert other.why == "not significant: p = 4.0e-01 over the 20 candidates tried, 0.002 is required"
 
 
 def test_a_joints_own_delay_of_less_than_a_sample_is_not_an_effect():
@@ -163,8 +161,8 @@ def test_too_small_a_gain_is_below_the_detection_limit(gain: float, removes: str
     ("change", "why"),
     [
         ({"min_outside": 0.6}, "lies outside the model"),
-        ({"family_error": 1e-11}, "could be chance"),
-        ({"min_gain": 0.5}, "below the detection limit: removes 40.0% of the squared residual, 50% is asked"),
+        ({"family_error": 1e-11}, "may be chance"),
+        ({"min_gain": 0.5}, "below the detection limit: removes 40.0% of the squared residual, 50% is required"),
     ],
 )
 def test_the_numbers_are_those_of_the_criteria(change: dict, why: str):
@@ -183,7 +181,7 @@ def test_what_fits_with_an_impossible_sign_only_has_no_gain_and_no_significance(
     item = replace(GOOD, value=np.array([-1e-4]), covariance=np.array([[1e-12]]), p_value=1e-50)
     decision = decided(Candidate(JointElasticity(), Member(0, (30.0, 0.2))), item, 100)
     assert (decision.accepted, decision.gain, decision.examination.p_value) == (False, 0.0, 1.0)
-    assert decision.why == "no elastic gear: the link would run ahead of its motor"
+    assert decision.why == "its compliance would be negative: the link would move ahead of its motor"
     # Two coefficients, of which one has an impossible sign, say more than that.
     assert decided(SPRING, replace(GOOD, value=np.array([-0.05, 0.0])), 100).gain == 0.4
 

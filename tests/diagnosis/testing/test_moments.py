@@ -16,7 +16,7 @@ from tests.diagnosis.made import exact_runs, periodic_run, step_beside
 SPRING = Candidate(Spring(), Member(0))
 
 
-def test_of_copies_of_recordings_as_much_is_told_as_of_one_of_each():
+def test_of_copies_of_recordings_as_much_is_determined_as_of_one_of_each():
     single = [exact_runs()[0], exact_runs()[2]]
     copies = [replace(item, name=item.name.replace("_1", f"_{k}")) for item in single for k in (1, 2, 3)]
     alone, both = step_beside(single), step_beside(copies)
@@ -35,7 +35,7 @@ def test_where_no_motion_is_repeated_nothing_changes():
     assert examine_moments(step, SPRING).p_value == pytest.approx(alone.examination.p_value, rel=1e-6)
 
 
-def test_of_the_periods_of_a_run_as_much_is_told_as_of_fewer():
+def test_of_the_periods_of_a_run_as_much_is_determined_as_of_fewer():
     three, five = (step_beside([periodic_run(count)]) for count in (3, 5))
     (alone,), (many,) = three.judge([SPRING]), five.judge([SPRING])
     once = [examine_moments(step, SPRING).freedom for step in (three, five)]

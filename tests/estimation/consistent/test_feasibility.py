@@ -69,7 +69,7 @@ def test_base_parameters_that_contradict_each_other_are_named_and_no_others():
     assert check_consistency(model, value).possible
 
 
-def test_friction_that_pushes_or_is_too_much_for_the_motor_is_told_with_its_speeds():
+def test_friction_that_pushes_or_is_too_much_for_the_motor_is_reported_with_its_speeds():
     model = build_model(load_robot(), "complete")
     value = parameters(model, model.robot.standard_parameters(), (0.1, 0.1))
     # 0.27 - 1.2 v + v^2 is negative between 0.3 and 0.9.
@@ -174,7 +174,7 @@ def test_what_the_solver_leaves_open_is_undecided_and_not_an_error(model, monkey
     assert found.possible is None
     assert found.margin < -1e-3
     (reason,) = found.reasons
-    assert reason.startswith("undecided whether bodies with these base parameters exist")
+    assert reason.startswith("whether bodies with these base parameters exist is undecided")
     # Friction that pushes is impossible whatever the bodies are.
     value[model.names.index("a01")] = -1.0
     found = check_consistency(model, value)

@@ -137,7 +137,7 @@ def test_without_limits_units_are_the_speed_and_the_friction_of_the_recordings()
     assert as_recorded(polynomial(np.inf, np.inf), 0.0 * factor, value) == polynomial(np.inf, np.inf)
 
 
-def test_friction_is_told_in_what_is_usual_of_it_where_that_is_known():
+def test_friction_is_given_to_the_solver_in_its_usual_size_where_that_is_known():
     assert torque_unit(polynomial(2.0, 50.0)) == 50.0
     assert torque_unit(polynomial(2.0, np.inf)) == 1.0
     small = replace(polynomial(2.0, 50.0), usual_torque=0.01)

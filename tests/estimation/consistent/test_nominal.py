@@ -43,7 +43,7 @@ def test_a_known_rotor_is_kept_and_an_unknown_one_is_guessed_as_everywhere(tmp_p
     assert nominal(replace(empty, effort_limit=np.array([np.inf]))).armature[0] > 0.0
 
 
-def test_links_without_mass_extent_or_sense_are_replaced_and_told(tmp_path):
+def test_links_without_mass_extent_or_sense_are_replaced_and_reported(tmp_path):
     cases = {
         "gives no mass": Link(mass=0.0, com=(0.0, 0.0, 0.0), inertia=(0.0, 0.0, 0.0)),
         "gives a point mass": Link(mass=1.0, inertia=(0.0, 0.0, 0.0)),

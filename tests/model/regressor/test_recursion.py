@@ -48,7 +48,7 @@ def test_joints_stand_where_pinocchio_has_them(seed: int, bodies: int) -> None:
 
 @settings(max_examples=20)
 @given(seed=SEEDS, bodies=st.integers(1, 5))
-def test_a_lift_under_the_arm_cannot_be_told_from_gravity(seed: int, bodies: int) -> None:
+def test_a_lift_under_the_arm_cannot_be_distinguished_from_gravity(seed: int, bodies: int) -> None:
     """An arm that a slide without gravity pushes up at g feels what it feels at rest under gravity."""
     gravity = 9.81
     lifted, standing = pin.Model(), pin.Model()

@@ -66,7 +66,9 @@ def test_an_effort_that_is_dead_most_of_the_time_is_refused_where_no_other_joint
 
 
 @pytest.mark.parametrize(("dead", "said"), [(2400, True), (500, False)])
-def test_a_coarse_effort_that_dies_is_told_by_how_much_longer_it_lasts_than_any_other(read, dead: int, said: bool):
+def test_a_coarse_effort_that_dies_is_recognised_by_how_much_longer_it_lasts_than_any_other(
+    read, dead: int, said: bool
+):
     """Of 17 values one that lasted for 55 % of the time was believed, and the joint's inertia was 6.6 instead of 16.1."""
     made = columns()
     made["joint1.effort"] = 0.1 * np.round(made["joint1.effort"] / 0.1)

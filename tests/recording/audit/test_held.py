@@ -177,7 +177,7 @@ def test_positions_that_are_late_under_new_efforts_are_left_out():
     assert "rows have the positions of the row before while the arm moves, first row 31 " in finding.message
 
 
-def test_of_a_joint_that_moves_alone_no_late_position_is_told():
+def test_of_a_joint_that_moves_alone_no_late_position_is_determined():
     made = noisy(4)
     made.position[1] = 0.3
     made = with_copies(made, np.arange(30, 700, 60), efforts=False)

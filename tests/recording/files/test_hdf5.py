@@ -17,7 +17,7 @@ from tests.recording.files.made import MADE, assert_same, described, expected
 from tests.recording.made import refusal
 
 
-def test_data_sets_of_hdf5_are_told_by_their_path(tmp_path):
+def test_data_sets_of_hdf5_are_determined_by_their_path(tmp_path):
     content = {"arm/t_ns": np.rint(MADE["time"] * 1e9).astype(np.int64)}
     for joint in JOINTS:
         content[f"arm/{joint}/turns"] = MADE[f"{joint}.position"] / (2 * np.pi)

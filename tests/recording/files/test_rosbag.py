@@ -48,7 +48,7 @@ def test_folders_and_globs_hold_bags_beside_files(tmp_path):
     assert file.name == "a_1"
 
 
-def test_joints_that_are_published_apart_and_in_any_order_are_told_by_name(tmp_path):
+def test_joints_that_are_published_apart_and_in_any_order_are_determined_by_name(tmp_path):
     wanted = expected(tmp_path)
     swapped = write_bag(tmp_path / "swapped", MADE, names=("joint2", "joint1"))
     assert_same(read_recording(swapped, load_robot()), wanted, clock=1e-9)

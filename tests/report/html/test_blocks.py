@@ -25,7 +25,7 @@ def test_zeros_at_the_end_are_digits_and_what_is_no_number_is_a_dash(value: floa
 
 
 @pytest.mark.parametrize(("p", "text"), [(0.0, "< 1e-99"), (3.14e-7, "3e-07"), (0.0314, "0.031"), (1.0, "1")])
-def test_chances_are_told_in_few_digits(p: float, text: str):
+def test_chances_are_reported_in_few_digits(p: float, text: str):
     assert chance(p) == text
 
 

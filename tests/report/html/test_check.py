@@ -32,8 +32,7 @@ def test_a_broken_limit_is_shown_with_its_time(checked, checked_page):
         ({"Coulomb": 1.0, "viscous": 2.0}, "of these the sum of Coulomb, viscous becomes heat"),
         (
             {"viscous": 2.0, "cubic": -1.0},
-            "of these the sum of viscous, cubic becomes heat, and a negative one belongs to the curve of friction that they "
-            "make together",
+            "of these the sum of viscous, cubic becomes heat; a negative one belongs to a friction curve, which only their sum describes",
         ),
     ],
 )

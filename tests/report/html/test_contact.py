@@ -29,4 +29,4 @@ def test_on_a_small_arm_all_joints_tell_the_place(touched):
     small = SimpleNamespace(known=SimpleNamespace(robot=load_robot()))
     each = replace(touched.contacts[0], joints=("joint1",))
     words, _ = _contacts(replace(touched, observer=small, contacts=(each,)))
-    assert "explains the torque of all joints, else" in words.text
+    assert "explains the torque of all joints; otherwise" in words.text

@@ -47,7 +47,7 @@ def errors(effects: list[Any]) -> dict[str, Any]:
 @pytest.mark.parametrize("effects", [["spring"], []])
 def test_what_is_left_is_after_over_before_and_without_effects_there_is_one_error(effects):
     said, table, folded = gain_blocks(errors(effects), ROBOT)
-    assert "11 to 23 % of the time is left out" in said.text
+    assert "11 to 23 % of the time, at rest, at reversals" in said.text
     assert isinstance(table, Table)
     first = [cell.text if isinstance(cell, Cell) else cell for cell in table.rows[0]]
     if effects:
@@ -60,7 +60,7 @@ def test_what_is_left_is_after_over_before_and_without_effects_there_is_one_erro
     assert len(folded.inside.head) == len(folded.inside.rows[0])
 
 
-def test_beside_offsets_that_differ_errors_are_told_without_them_too():
+def test_beside_offsets_that_differ_errors_are_reported_without_them_too():
     """What an effect leaves could not be seen beside the offsets: 99 % of it."""
     content = errors(["spring"])
     content["training"]["before_own_offset"] = {"joint1": 0.01, "joint2": 0.01}

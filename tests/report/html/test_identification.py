@@ -18,7 +18,7 @@ def test_an_identification_has_all_its_sections(identified):
     expected |= {"torque", "correlation", "frequency", "order", "lag", "friction-0", "friction-1"}
     expected |= {f"converge-{k}" for k in range(15)}
     assert expected <= set(found.figures)
-    assert "It generalises worst to CI_1" in found.words
+    assert "The largest held-out error is on CI_1" in found.words
     assert "Predicts held-out recordings to within " in found.words
 
 

@@ -75,4 +75,4 @@ def test_a_motor_that_never_makes_a_turn_has_no_figure_over_its_angle():
     slow = replace(ROBOT, reduction=np.array([1.0, 100.0]))
     blocks = residual_blocks(slow, {"fitted": [trace_of(swinging(noise()))]}, BANDS)
     assert {key[2] for key in figures(blocks)["against-motor"].variants} == {1}
-    assert any("No figure over the motor's angle of joint1:" in b.text for b in blocks if isinstance(b, Paragraph))
+    assert any("No figure over the motor angle of joint1:" in b.text for b in blocks if isinstance(b, Paragraph))

@@ -93,7 +93,7 @@ def test_a_broken_section_is_one_line_that_names_it(installed, name, said):
     assert "\n" not in str(caught.value)
 
 
-def test_two_sections_of_one_id_are_told(installed):
+def test_two_sections_of_one_id_are_reported(installed):
     installed("Energy")
     with pytest.raises(ScaraIdentError, match="energy: two sections of the report have this id"):
         parts("identification", (Energy(),), "words")
@@ -109,7 +109,7 @@ def test_a_section_with_nothing_to_say_is_left_out(installed):
     assert parts("identification", (Empty(),), "words") == []
 
 
-def test_a_broken_section_is_told_before_the_work(installed, tmp_path):
+def test_a_broken_section_is_reported_before_the_work(installed, tmp_path):
     installed("Bare")
     check_report(None, "paper")
     with pytest.raises(ScaraIdentError, match="my-bare"):

@@ -50,7 +50,7 @@ def test_candidates_no_better_than_chance_are_counted_and_not_named():
     held = {"training": errors, "validation": errors, "candidates": tried, "left_out": {"training": {"joint1": 0.12}}}
     held["torque_units"] = {"joint1": "N m"}
     assert tables(held)[0].title == "rms error within the band [N m]"
-    assert "12 % of the time is left out" in str(tables(held)[0].caption)
+    assert "12 % of the time, at rest," in str(tables(held)[0].caption)
 
     def labels(content: dict, *, everything: bool = False) -> list[str]:
         return list(tables(content, all_candidates=everything)[1].columns[0].cells)

@@ -10,7 +10,7 @@ def test_an_identification_tells_parameters_errors_and_sentences(results: Result
     assert "rms error within the band [N m], fitted" in text
     assert "rms error within the band [N m], held out" in text
     assert "band: joint1 25 Hz, joint2 25 Hz; J_d" in text
-    assert "It generalises worst to OJK_1" in " ".join(text.split())
+    assert "The largest held-out error is on OJK_1" in " ".join(text.split())
     assert all(f"note: {note}"[:60] in text for note in results.identification.notes)
 
 
