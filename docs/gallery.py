@@ -2,11 +2,11 @@
 
 Every effect of the registry is put on a virtual arm whose recordings are then diagnosed twice: with all effects, which
 gives the picture and the parameters, and with all others, which shows what it would be taken for. What an effect is, is
-said in the words of its class and of docs/theory.md.
+taken from the docstring of its class and from docs/theory.md.
 
     python docs/gallery.py            # all, in some minutes
     python docs/gallery.py spring     # one
-    python docs/gallery.py --words    # no picture: the words of the classes alone, when they have changed
+    python docs/gallery.py --words    # no picture: only the words of the classes, when they have changed
 """
 
 from __future__ import annotations
@@ -55,15 +55,16 @@ SHORT = {
 
 HEAD = """# Gallery of effects
 
-Every effect that the diagnosis knows, as it looks: each was put on a virtual arm, whose recordings were then diagnosed.
-Orange is the residual before the effect came in, blue after, dashed what the effect adds to the prediction; above, green is
-the torque that the rest of the model leaves to the effect, dotted the effect as found. Bands are two standard errors. *Taken
-for* is what the diagnosis of the same recordings finds when the effect is left out of the catalogue: what it can be confounded
-with. Where that is nothing and the verdict `complete`, the effect is missed: what is left without it passes for noise, or for
-what runs differ by ([limits](diagnosis.md#the-verdict)). On poorer motions more is alike; see [Groups](diagnosis.md#groups). The
-columns are explained in [Theory](theory.md#effects).
+Every effect that the diagnosis knows, with its typical picture: each was put on a virtual arm, and the recordings were
+diagnosed. Orange is the residual without the effect, blue with it; dashed is what the effect adds to the prediction. In
+the upper panel green is the torque that the rest of the model leaves to the effect, dotted the identified effect. Bands
+are two standard errors. *Taken for* is what the diagnosis of the same recordings finds when the effect is not in the
+catalogue: the effects that it can be confounded with. If nothing is found and the verdict is `complete`, the effect is
+missed: without it the residual looks like noise, or like differences between runs ([limits](diagnosis.md#the-verdict)).
+With less excitation more effects look alike; see [Groups](diagnosis.md#groups). The columns are explained in
+[Theory](theory.md#effects).
 
-This page is written by `python docs/gallery.py`, in the words of the effects' classes. Yours: [My own
+This page is written by `python docs/gallery.py` from the docstrings of the effects' classes. To add an effect: [My own
 effect](howto/my-own-effect.md).
 """
 
@@ -289,7 +290,7 @@ def stand_ins(robot: Robot, runs: Sequence[Recording], name: str, effect: FoundE
     rest = _squares(found, robot)
     start, own = rest[0], sum((effect.after[j] or 0.0) ** 2 / (effect.before[j] or 1.0) ** 2 for j in robot.joints)
     share = (start - rest[1]) / max(start - own, 1e-12)
-    removes = f"{share:.0%} of what it removes" if share > 0.0 else "nothing over all joints"
+    removes = f"{share:.0%} of what the effect removes" if share > 0.0 else "nothing over all joints"
     return f"**Taken for:** {', '.join(labels)}, which removes {removes}; the verdict is then `{found.verdict}`."
 
 
@@ -302,7 +303,7 @@ def _removed(effect: FoundEffect) -> str:
     """Say how much of a joint's squared residual an effect removes, where that is most."""
     shares = {j: 1.0 - ((effect.after[j] or 0.0) / b) ** 2 for j, b in effect.before.items() if b}
     most = max(shares, key=lambda joint: shares[joint])
-    return f"{shares[most]:.0%} of what is left on {most}, squared"
+    return f"{shares[most]:.0%} of the squared residual of {most}"
 
 
 def _squares(found: Diagnosis, robot: Robot) -> tuple[float, float]:
