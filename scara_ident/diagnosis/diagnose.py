@@ -55,9 +55,9 @@ from scara_ident.robot.robot import Robot
 from scara_ident.threads import one_blas_thread
 
 _LOG = logging.getLogger(__name__)
-# Dependences that are handed on: further ones are pairs that only repeat the first.
+# Number of dependences in the result: further ones are pairs that only repeat the first.
 NAMED_DEPENDENCES = 12
-# Said where effects are estimated in a lower band than they were found in.
+# Note if effects are estimated in a lower band than they were found in.
 QUIETER = "all parameters are estimated below {:.2g} Hz: up to {:.2g} Hz, the band of the search, the noise of the positions biases them by more than chance"
 
 
@@ -153,7 +153,7 @@ class Diagnosis(Saved, reported_by="diagnosis"):
         return f"{self.robot.name}: {', '.join((self.verdict, *(item.label for item in self.effects)))}"
 
 
-# Matrices are small throughout: a second BLAS thread waits more than it works.
+# All matrices are small: a second BLAS thread would mostly wait.
 @one_blas_thread()
 def diagnose(
     robot: Robot,
@@ -246,7 +246,7 @@ def diagnose(
     notes[:0] = (*robot.notes, *base.notes)
     known = frozenset(unloaded)
     families = tuple(item.knowing(known) for item in families)
-    # Who gives all that is built in, and more, asks for none of it.
+    # A catalogue with everything that is built in is not a request for single effects.
     chosen = catalogue is not None and not set(CATALOGUE) <= set(catalogue)
     task = SearchTask(base, families, criteria, searching(work, band_given=given), chosen)
     outcome, events = _without_events(task, observations, free=not given)
@@ -259,7 +259,7 @@ def diagnose(
     final = reported if parameters.linear is None else with_whole_estimate(reported, parameters.linear)
     rows, useless = with_rows(held_out.at(found.bands), found.scene.robot, needed=False)
     held = validated(final, rows)
-    # What was asked beside the model stays as it was asked, and where.
+    # Effects beyond the model keep their values and their bands.
     final = replace(final, search=found)
     searched, seen = (final, held) if reported is outcome else _where_searched(outcome, held_out)
     readings = direct_readings(found, families, criteria.rotor_inertia_std)
@@ -274,13 +274,13 @@ def diagnose(
     notes += _remarks(final, parameters)
     notes += [event.sentence(robot) for event in events]
     log_notes(_LOG, notes)
-    # Where something is known to be left over no more is to be said of it.
+    # If an unexplained remainder is known, evidence adds nothing on it.
     lines = (None,) * robot.n if final.unexplained is not None else standing_lines(searched.residuals, criteria)
     shown = weighed_evidence(searched, seen, effects, lines, criteria)
     believed = {(item.effect, item.joint) for item in effects}
     tentative = tentative_effects(found, refused, believed)
     named = believed | {(item.effect, item.joint) for item in tentative}
-    # A result is held for longer than what only saved time.
+    # A result is kept longer than caches.
     found.step.lean()
     return Diagnosis(
         verdict_of(final, effects, shown),
@@ -307,15 +307,16 @@ def diagnose(
 
 
 def _whole(outcome: Outcome) -> SelectionStep:
-    """Return the step that all parameters of an outcome are estimated by."""
+    """Return the step by which all parameters of an outcome are estimated."""
     found, after = outcome.search, outcome.after
     return replace(found.whole(replace(found.step, weights=after.weights)), variation=after.offsets)
 
 
 def _where_searched(outcome: Outcome, held_out: PreparedData) -> tuple[Outcome, Validation]:
-    """Return an outcome that is estimated in other bands at the whole estimate in its own, and what recordings held out say of that.
+    """Return an outcome that was estimated in other bands, at the estimate in its own bands, and what held-out recordings show of it.
 
-    Whether what is left is noise is asked where most of it is seen, by what leaves the least there.
+    Whether the residual is noise is tested in the band that shows most of it, with the estimate that leaves least
+    there.
     """
     linear = physical_parameters(_whole(outcome)).linear
     assert linear is not None
@@ -325,7 +326,7 @@ def _where_searched(outcome: Outcome, held_out: PreparedData) -> tuple[Outcome, 
 
 
 def _without_events(task: SearchTask, observations: Observations, *, free: bool) -> tuple[Outcome, tuple[Event, ...]]:
-    """Search without what is local in time, and again if with the effects found that is something else."""
+    """Search without the events, and again if the events change with the effects found."""
     events = not_explained(task, observations, find_events(observations, robust_fit(observations).value))
     now, left = first(task.progress)
     outcome = select_model(replace(task, progress=now), without_events(observations, events), free=free)
@@ -339,7 +340,7 @@ def _without_events(task: SearchTask, observations: Observations, *, free: bool)
 
 
 def _remarks(outcome: Outcome, parameters: PhysicalParameters) -> list[str]:
-    """Return what else there is to say of a search and what it leaves, in words."""
+    """Return further notes on a search and on its residual."""
     found, after, left = outcome.search, outcome.after, outcome.unexplained
     robot, notes = found.scene.robot, [*found.notes]
     drift = clock_drift(after.value, outcome.training)

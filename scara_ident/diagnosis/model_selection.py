@@ -32,17 +32,17 @@ from scara_ident.estimation.explained_power import EXPLAINED, sample
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.motion.prepared import PreparedData
 
-# Of what is suspected, and others may stand for.
+# Reason for a suspected effect for which others may stand.
 TOO_LITTLE = "{0.label} would remove {0.gain:.0%} of what is left, but the recordings excite it too little to distinguish it from other effects"
 
 
 def select_model(task: SearchTask, observations: Observations, *, free: bool) -> Outcome:
-    """Search for what a model lacks in the band where that can be determined.
+    """Search for what a model lacks, in a band that determines it.
 
     Parameters
     ----------
     observations : Observations
-        Of the base model, in the bands to begin with.
+        Of the base model, in the first bands.
     free : bool
         Whether another band may be chosen.
     """
@@ -53,7 +53,7 @@ def select_model(task: SearchTask, observations: Observations, *, free: bool) ->
     narrower: Search | None = None
     for _ in range(criteria.max_widenings if free else 0):
         left("choosing the band again")
-        # What was missing had hidden how far up the motion explains the torque, and other effects with it.
+        # The missing effect had hidden how far up the motion explains the torque, and with it other effects.
         explains = max(choose_bands(found.model, found.data).bands) if found.chosen else 0.0
         asked = _asked_band(found)
         promised = max(asked, _promised_band(found, criteria))
@@ -68,26 +68,26 @@ def select_model(task: SearchTask, observations: Observations, *, free: bool) ->
         again = search(replace(task, progress=now), more, known=found)
         confirmed = asked >= criteria.wider * _widest(found.data) and _asked_band(again) > 0.0
         if promised > explains and not confirmed and not _new(again, found):
-            # The motion says less of what is so far up, and there is nothing.
+            # So far up the motion determines less, and nothing was found.
             break
         found.step.columns.leave()
-        # For what was found there, not for what the motion tells or effects in the model ask for.
+        # The band is wide for the effect found there, not for the motion or for the effects in the model.
         narrower = found if promised > explains and not confirmed else None
         found = again
     left("testing what is left")
     outcome = _without_proxies(replace(task, progress=left), outcome_of(task, found))
     if narrower is None or not narrower.chosen or _labels(outcome.search) != _labels(narrower):
         return outcome
-    # What the wider band was for did not stand.
+    # The effect that required the wider band was not accepted.
     back = _without_proxies(replace(task, progress=left), outcome_of(task, narrower))
     return replace(back, demoted=(*outcome.demoted, *back.demoted))
 
 
 def below_position_noise(task: SearchTask, outcome: Outcome) -> Outcome:
-    """Return what a search leaves, estimated in the lower part of the band where the noise of positions moves what was found.
+    """Return the outcome of a search, estimated in the lower part of the band if the noise of positions biases the effects found.
 
-    Effects that act together tell so, see `quieter`, and all that was fitted with them moves too. As it was where something is left
-    over, or an effect does not stand there.
+    Effects that act together show this, see `quieter`, and everything that was fitted with them changes too. The
+    outcome is unchanged if something is left over, or if an effect is not accepted there.
     """
     found, after = outcome.search, outcome.after
     if outcome.unexplained is not None:
@@ -103,46 +103,47 @@ def below_position_noise(task: SearchTask, outcome: Outcome) -> Outcome:
 
 
 def _promised_band(found: Search, criteria: SelectionCriteria) -> float:
-    """Return the band that would tell effects that are not in the model and may be there, Hz; 0 where there are none."""
+    """Return the band that would determine effects that may be missing in the model, Hz; 0 if there are none."""
     chosen, left = _labels(found), float(np.sum(found.step.model.squares))
     promising = [
         item
         for item in found.decisions
         if item.label not in chosen
-        # A fit with all else may have ended where it gains much beside others that it spoiled.
+        # A fit with everything else may have ended where it gains much but made others worse.
         and float(np.sum(item.examination.left)) < left
         and item.candidate.effect.band(item.candidate.member) > 0.0
         and more_than_chance(item, found.tried, criteria)
-        # A grid point loses the rest.
+        # A grid point loses the rest of the gain.
         and item.gain >= criteria.near_best * criteria.min_gain
         and hopeless(item, found.scene, criteria) is None
     ]
     if not promising:
         return 0.0
-    # What chance would not do says better where the band has to reach.
+    # Significant effects show better how wide the band must be.
     best = max(promising, key=lambda item: (item.examination.p_value * found.tried <= 1.0, item.gain)).candidate
     return _within(best.effect.band(best.member), found)
 
 
 def _band_beyond(task: SearchTask, found: Search) -> float:
-    """Return a band beyond that tells effects that this one does not, Hz; 0 where nothing is seen of them there.
+    """Return a wider band that determines effects that this one does not, Hz; 0 if it shows none.
 
-    Below a resonance little tells of it, and where it begins the model without it explains no torque: the band ends.
+    Below a resonance little shows it, and where it begins the model without it explains no torque, so the band ends
+    there.
     """
     band = _within(task.criteria.beyond * _widest(found.data), found)
     if band < task.criteria.wider * _widest(found.data):
         return 0.0
-    # One repetition of each motion shows what is large enough.
+    # One repetition of each motion is enough to show large effects.
     columns = CandidateColumns(observe(task.model, sample(found.data.at((band,) * len(found.bands)))))
     start = wls(columns.observations)
     scene = replace(scene_of(task.model, start.value, columns.observations), armatures=found.scene.armatures)
-    # In which intervals something acts every band shows, and what the band at hand holds was tried there.
+    # Every band shows effects in intervals, and effects within the present band were tried there.
     families = [effect for effect in task.catalogue if not effect.in_intervals]
     members = [Candidate(effect, item) for effect in families for item in effect.members(scene)]
     needing = [item for item in members if item.effect.band(item.member) > _widest(found.data)]
     tried = found.tried + len(needing)
     step = SelectionStep(scene, columns, found.chosen, start.weights, tried, task.criteria, start.offsets)
-    # The band was left where the motion explains less than half: so much of what is seen further up must be this effect.
+    # The band ends where the motion explains less than half: above it at least that much must be this effect.
     seen = [item for item in step.judge(needing) if item.accepted and item.gain >= task.criteria.near_best * EXPLAINED]
     fitted = [(own, item) for own, item in fitted_beside(step, seen, 0.0, None) if item.accepted]
     if not fitted:
@@ -154,7 +155,7 @@ def _band_beyond(task: SearchTask, found: Search) -> float:
 
 
 def _asked_band(found: Search) -> float:
-    """Return the band that tells the effects in the model from others, Hz; 0 where none asks for one."""
+    """Return the band that distinguishes the effects in the model from others, Hz; 0 if none requires one."""
     return _within(max((item.effect.band(item.member) for item in found.chosen), default=0.0), found)
 
 
@@ -163,13 +164,13 @@ def _within(band: float, found: Search) -> float:
 
 
 def _corrected_band(found: Search) -> float:
-    """Return the band, Hz, beyond which the rest of a correction hides what the arm does; infinite without one."""
+    """Return the band, Hz, above which the rest of a correction hides effects of the arm; infinite without a correction."""
     left = None if found.correction is None else found.correction.left(found.scene)
     return np.inf if left is None else left[1]
 
 
 def _new(found: Search, before: Search) -> bool:
-    """Whether effects that need a wide band were found that were not before."""
+    """Whether new effects were found that need a wide band."""
     labels = _labels(before)
     return any(item.effect.band(item.member) > 0.0 and item.label(found.scene) not in labels for item in found.chosen)
 
@@ -183,7 +184,7 @@ def _widest(data: PreparedData) -> float:
 
 
 def _without_proxies(task: SearchTask, found: Outcome) -> Outcome:
-    """Search again without effects that stand for another, or for none."""
+    """Search again without effects that stand for another effect, or for none."""
     demoted: dict[str, Decision] = {}
     instead: dict[str, tuple[Candidate, Candidate]] = {}
     left = task.progress
@@ -200,7 +201,7 @@ def _without_proxies(task: SearchTask, found: Outcome) -> Outcome:
         again = search_again(replace(task, progress=now), found.search, without, tuple(instead.values()))
         found = outcome_of(task, again)
     else:
-        # No further search, but nothing is believed that does not stand.
+        # No further search, but effects that fail are not believed.
         while unstable := _unstable(found, _others(demoted, found)):
             demoted |= {item.label: item for item in unstable}
             found = outcome_of(task, found.search.without([item.label for item in unstable]))
@@ -209,7 +210,7 @@ def _without_proxies(task: SearchTask, found: Outcome) -> Outcome:
 
 
 def _others(demoted: Mapping[str, Decision], found: Outcome) -> tuple[Decision, ...]:
-    """Return those in whose place nothing of their name was found."""
+    """Return those for which no effect of the same name was found instead."""
     chosen = _labels(found.search)
     return tuple(item for item in demoted.values() if item.label not in chosen)
 

@@ -1,8 +1,8 @@
 """What an effect is: a term of the torque equation that the base model may lack.
 
 A member of a family has fixed nonlinear parameters and is linear in its coefficients, so that all members of all
-families are columns of one regressor. All that is particular to an effect is said by its family, a subclass of
-`Effect`; estimation, diagnosis and report ask it.
+families are columns of one regressor. Everything particular to an effect is in its family, a subclass of `Effect`;
+estimation, diagnosis and report use it.
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ from scara_ident.model.terms import Column
 from scara_ident.motion.prepared import PreparedRecording
 from scara_ident.recording.recording import Recording
 
-# Standard deviations by which a coefficient may lie beyond what a real arm can have.
+# Standard deviations by which a coefficient may exceed what a real arm can have.
 DOUBT_STDS = 2.0
-# Values of a nonlinear parameter that are tried where a family does not say which.
+# Number of values of a nonlinear parameter that are tried by default.
 SCAN_POINTS = 5
 
 
@@ -45,16 +45,16 @@ SCAN_POINTS = 5
 class Effect(ABC):
     """A family of terms with one physical cause.
 
-    A subclass gives at least ``name``, ``summary``, ``coefficients`` and `signal_columns`; it then acts on the torque
+    A subclass defines at least ``name``, ``summary``, ``coefficients`` and `signal_columns`; it then acts on the torque
     of one joint, has one member per moving joint and value of its nonlinear parameters, and its coefficients are its
-    physical parameters. A family without fields of its own needs no decorator: those of one class are equal.
+    physical parameters. A family without fields needs no decorator: instances of one class are equal.
 
     Attributes
     ----------
     name : str
-        In the table of effects; families of one cause may share it.
+        Name in the table of effects; families of one cause may share it.
     summary : str
-        What it is, in a few words for a person; may hold the words of `words`.
+        A short description for the user; may contain the words of `words`.
     coefficients : tuple of Coefficient
     nonlinear : tuple of NonlinearParameter
     all_joints : bool
@@ -64,38 +64,38 @@ class Effect(ABC):
     follows_estimate : bool
         Whether the columns depend on the present estimate, ``scene.value`` or ``scene.armatures``.
     on_links : bool
-        Whether its torque acts on links, as a body's or a spring's: gears then transmit it, and effects with `Signals.load` know it.
+        Whether its torque acts on links, like that of a body or a spring: gears then transmit it, and it is part of `Signals.load`.
     of_position : bool
-        Whether its torque on links follows from the positions alone, so that how it changes with speeds need not be asked.
+        Whether its torque on links depends on positions alone, so that its derivatives by speeds are not needed.
     of_load : bool
-        Whether the columns are a function of the load that a gear transmits, and are made again beside an effect that acts on links.
+        Whether the columns are a function of the load of a gear; they are computed again if an effect that acts on links is in the model.
     fitted_first : bool
-        Whether it is judged at the estimate fitted with it only: its columns at the estimate without it are poor ones.
+        Whether it is judged only after a fit with it, because its columns at the estimate without it are poor.
     together, beside_together : bool
-        Whether what its members do follows from those of other joints in the model too, `Scene.together`: the columns of members in
-        it add up to what all of them do, those of another are what it changes beside them; or its columns do, and it is none of these.
+        Whether the torque of its members depends on members of other joints in the model, `Scene.together`: the columns of members in the model add
+        up to their common torque, and those of another member are the change by it. The second: only its columns depend on these members.
     by_recording, in_intervals : bool
-        Whether it acts in some recordings and not in others, see `in_recordings`, or in intervals that its member holds.
+        Whether it acts in some recordings and not in others, see `in_recordings`, or in intervals that its member contains.
     of_each_recording : bool
-        Whether each recording of the scene has a coefficient of its own, of which no other recording says anything.
+        Whether each recording of the scene has its own coefficient, about which other recordings contain no information.
     same_at_all_frequencies : bool
-        Whether its coefficient is the same in any part of the band, so that another one there says that it is not it.
+        Whether its coefficient is the same in any part of the band; if it differs there, it is another effect.
     in_small_ways : bool
-        Whether it is determined by small differences of positions, as setpoints do from what a controller makes of them.
+        Whether it is determined by small differences of positions, like those between setpoints and true positions.
     of_state : bool
-        Whether columns follow from the state at the sample by numpy's arithmetic, sin, cos, exp, abs and sign, as a controller's code can.
+        Whether columns follow from the state at the same sample with arithmetic, sin, cos, exp, abs and sign of numpy, so that code can be exported.
     smooth : bool
-        Whether the columns have nothing faster than the filtered motion: they are made at `PreparedStretch.decimated` samples.
+        Whether the columns contain no higher frequencies than the filtered motion: they are computed at the samples of `PreparedStretch.decimated`.
     seeded_by : {"order", "frequency"} or None
-        The lines of a residual's spectrum that suggest a member; see `seeds`.
+        The kind of spectral lines of a residual that suggest a member; see `seeds`.
     imitated_by : tuple of Effect
-        What no catalogue has and may be taken for it: it is not believed where one of these does as well and nothing of it is left beside.
+        Imitations in no catalogue that can be confused with it: it is not believed if one of these explains as much and nothing of it is left then.
     watched : bool
-        Whether it comes or grows as an arm ages, so that a fleet is watched for it.
+        Whether it appears or grows as an arm ages, so that `fleet` tests for it.
     view, experiment : View, str
-        What a figure shows it over, and what to record to bring it out against the others.
+        The signal over which a figure shows it, and what to record to distinguish it from the others.
     not_simulated : str
-        Why the virtual arm does not have it; empty where ``scara_ident.simulation`` has an effect of its name.
+        Why the virtual arm does not have it; empty if ``scara_ident.simulation`` has an effect of its name.
     """
 
     name: ClassVar[str]
@@ -157,7 +157,7 @@ class Effect(ABC):
                 rows[joint][k] = column if np.ndim(column) == 1 else column[joint]
 
     def torque_on_links(self, signals: Signals, member: Member, value: Array) -> Array:
-        """Return what coefficients (k,) do to the links of an arm, shape (n, N), on the side of the recorded torque."""
+        """Return the torque on the links with coefficients (k,), shape (n, N), on the side of the recorded torque."""
         found = np.zeros_like(signals.motion.q)
         for x, column in zip(value.tolist(), self._named(signals, member), strict=True):
             found[member.place if np.ndim(column) == 1 else slice(None)] += x * column
@@ -172,11 +172,11 @@ class Effect(ABC):
         return columns
 
     def rows(self, scene: Scene, member: Member) -> list[int]:
-        """Return the places of the joints whose torque the columns act on."""
+        """Return the indices of the joints on whose torque the columns act."""
         return list(range(scene.robot.n)) if self.all_joints or member.joint is None else [member.joint]
 
     def joints(self, scene: Scene) -> list[int]:
-        """Return the places of the joints that can have it."""
+        """Return the indices of the joints that can have it."""
         return [j for j in range(scene.robot.n) if self.at_rest or (scene.speed[j] > 0.0 and scene.travel[j] > 0.0)]
 
     def scan(self, scene: Scene, joint: int) -> Iterable[tuple[float, ...]]:
@@ -197,11 +197,11 @@ class Effect(ABC):
         return tuple(Member(j, values) for j in self.joints(scene) for values in self.scan(scene, j))
 
     def doubtful(self, scene: Scene) -> tuple[Member, ...]:
-        """Return members that others may stand for, but of which these recordings hold too little to believe them."""
+        """Return members for which others may stand, but which these recordings excite too little to be believed."""
         return ()
 
     def words(self, scene: Scene, member: Member) -> dict[str, Any]:
-        """Return what `summary` and `coefficients` may name: joints, their units, nonlinear parameters."""
+        """Return the words that `summary` and `coefficients` may contain: joints, their units, nonlinear parameters."""
         robot = scene.robot
         found: dict[str, Any] = {"joint": "all joints"}
         found |= {item.name: value for item, value in zip(self.nonlinear, member.nonlinear, strict=True)}
@@ -225,7 +225,7 @@ class Effect(ABC):
         )
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
-        """Say why coefficients, two standard deviations given them, cannot be those of a real arm; None where they can."""
+        """Return why coefficients, within two standard deviations, are impossible for a real arm; None if they are possible."""
         for item, x, spread in zip(self.coefficients, value, DOUBT_STDS * std, strict=False):
             if item.positive and x < -spread:
                 return item.positive
@@ -236,8 +236,8 @@ class Effect(ABC):
     def parameters(self, scene: Scene, member: Member, value: Array, covariance: Array) -> Mapping[str, Parameter]:
         """Turn coefficients (k,) and their covariance (k, k) into the effect's physical parameters.
 
-        The nonlinear parameters are added by the caller, who knows how sure they are. Where `estimated_beside` names a member
-        that was found too, its coefficients follow.
+        The caller adds the nonlinear parameters with their uncertainty. If `estimated_beside` names a member that was
+        found too, its coefficients are appended.
         """
         return {
             column.name: Parameter(float(value[k]), deviation(covariance, k), column.unit)
@@ -245,33 +245,33 @@ class Effect(ABC):
         }
 
     def with_symmetric_powers(self, parameters: Mapping[str, Parameter]) -> Mapping[str, Parameter]:
-        """Return physical parameters, nonlinear ones too, with the power of each that the data tell, where others decide that."""
+        """Return all physical parameters with their symmetric powers, if these depend on the other parameters."""
         return parameters
 
     def estimated_beside(self, scene: Scene, member: Member) -> Member | None:
-        """Return the member of this family by whose coefficients too, where it is found, the physical parameters are."""
+        """Return the member of this family whose coefficients, if it is found, the physical parameters depend on too."""
         return None
 
     def description(self, scene: Scene, member: Member) -> str:
-        """Say in a few words what the effect is, for a person."""
+        """Return a short description of the effect for the user."""
         return self.summary.format(**self.words(scene, member))
 
     def or_else(self, scene: Scene, member: Member, value: Array) -> str:
-        """Say after the description what else an effect of these coefficients may be, by the model's parameters with it; or ""."""
+        """Return, for the end of the description, what else an effect with these coefficients may be, given the model's parameters; or ""."""
         return ""
 
     def or_else_beside(self, member: Member, value: Array, others: Sequence[tuple[Effect, Member, Array]]) -> str:
-        """Say what else it may be together with another found: families, members and coefficients of these are given; or ""."""
+        """Return what else it may be together with other effects found, given their families, members and coefficients; or ""."""
         return ""
 
     def gap(self, scene: Scene, member: Member) -> tuple[float, ...]:
-        """Return, for every nonlinear parameter, how wide a range of its values leaves every row the same."""
+        """Return, for every nonlinear parameter, the range of values for which no row changes."""
         return (0.0,) * len(self.nonlinear)
 
     def resolution(self, scene: Scene, member: Member) -> tuple[float, ...] | None:
-        """Return, for every nonlinear parameter, how far apart two values must be to be told apart.
+        """Return, for every nonlinear parameter, the distance at which two values can be distinguished.
 
-        None where the spacing of the members tried says it.
+        None: the spacing of the members tried is used.
         """
         return None
 
@@ -280,35 +280,35 @@ class Effect(ABC):
         return (Member(joint, (line.position,)),) if line.kind == self.seeded_by else ()
 
     def same_columns(self, scene: Scene, member: Member) -> tuple[tuple[Effect, Member], ...]:
-        """Return members of other families that have a member's columns on this robot, and that no scan need try."""
+        """Return members of other families with the same columns on this robot, which need not be tried."""
         return ()
 
     def in_full(self) -> Effect | None:
-        """Return a family with more columns that may take its place once a member is to be believed; None without one."""
+        """Return a family with more columns that replaces it once a member passed the tests; None without one."""
         return None
 
     def in_place_of(self, scene: Scene, effect: Effect, member: Member, value: Array) -> Member | None:
-        """Return what to try in the place of one of another family whose coefficients are those of no arm; None without one."""
+        """Return what to try in the place of a member of another family with impossible coefficients; None without one."""
         return None
 
     def other_laws(self) -> tuple[Effect, ...]:
-        """Return families of the same cause and parameters by another law, which may take its place where they explain more."""
+        """Return families of the same cause and parameters with another law, which may replace it if they explain more."""
         return ()
 
     def law(self) -> Mapping[str, Parameter]:
-        """Return what tells the law from that of the effect's name; nothing where it is that one."""
+        """Return the parameters that distinguish the law from the standard one; empty for the standard law."""
         return {}
 
     def band(self, member: Member) -> float:
-        """Return the band, Hz, that holds where a member shows most; 0 where every band does."""
+        """Return the band, Hz, that contains the frequencies at which a member shows most; 0 if every band does."""
         return 0.0
 
     def turns_on(self, member: Member) -> tuple[float, float]:
-        """Return the shortest way of its joint, rad or m, and the lowest speed that a member turns on; infinite where none does."""
+        """Return the shortest travel of its joint, rad or m, and the lowest speed that a member depends on; infinite if none."""
         return np.inf, np.inf
 
     def knowing(self, unloaded: frozenset[str]) -> Effect:
-        """Return the family that knows the names of recordings in which the arm carries nothing."""
+        """Return the family with the names of recordings without payload."""
         return self
 
     def in_recordings(self, scene: Scene, member: Member, names: frozenset[str]) -> Member:
@@ -316,22 +316,22 @@ class Effect(ABC):
         return member
 
     def geared_joint(self, member: Member) -> int | None:
-        """Return the joint on the torque behind whose gear it depends, and so on the rotor's share of an inertia.
+        """Return the joint whose gear torque it depends on, and so on the rotor's share of an inertia.
 
         It then depends on the effects in the model with `on_links` too.
         """
         return None
 
     def passes_on(self, member: Member, value: Array, driving: float) -> float | None:
-        """Return the share of a drive's torque that reaches links, driving from 1, them, to -1, driven by them; None for all."""
+        """Return the share of a drive's torque that reaches the links, for ``driving`` from 1 (it drives them) to -1 (they drive it); None: all of it."""
         return None
 
     def tie(self, scene: Scene, member: Member) -> Tie | None:
-        """Return what the only coefficient is by the nonlinear parameters; None where it is free."""
+        """Return how the only coefficient follows from the nonlinear parameters; None if it is free."""
         return None
 
     def slopes(self, signals: Signals, member: Member) -> Iterable[tuple[NDArray[np.intp], Array]]:
-        """Give of each joint by which of the ``p + 1 + s`` of `Tie.slopes` a tied member's torque changes, and its derivatives (k, N).
+        """Return, for each joint, on which of the ``p + 1 + s`` of `Tie.slopes` a tied member's torque depends, and its derivatives (k, N).
 
         Its coefficient is held; places (k,) that are not given have derivatives of zero.
         """
@@ -340,34 +340,34 @@ class Effect(ABC):
     def estimate_slopes(self, signals: Signals, member: Member, value: Array) -> EstimateSlopes:
         """Return the derivatives of an untied member's torque, its coefficients (k,) held, by the base model's parameters.
 
-        Asked of a family with `follows_estimate`. Unless it says them, differences of its columns do, which takes longer.
+        Used for a family with `follows_estimate`. By default differences of its columns are used, which takes longer.
         """
         return slopes_by_differences(self, signals, member, value)
 
     def instead(self, scene: Scene, member: Member) -> tuple[tuple[Member, Member], ...]:
-        """Return pairs, the likeliest first, of which one alone, of the member's joint and first, may have taken up what both do."""
+        """Return pairs, the most likely first, whose torque one member alone, on the member's joint, may have absorbed."""
         return ()
 
     def elsewhere(self, scene: Scene, member: Member) -> tuple[Member, ...]:
-        """Return members of the same joint from which a fit of several that act together may end in another minimum."""
+        """Return members of the same joint as other starting points of a fit of several that act together."""
         return ()
 
     def unfound(self, scene: Scene, member: Member) -> tuple[Member, ...]:
-        """Return members of other joints that may be there too, and of which this one takes up what is too small to be found."""
+        """Return members of other joints that may be there too, but are too small to be found and are absorbed by this one."""
         return ()
 
     def essential(self, scene: Scene, member: Member) -> slice:
-        """Return the coefficients of which one at least is not zero where the effect is there: all, unless one says it."""
+        """Return the coefficients of which at least one is not zero if the effect is there; default: all."""
         return slice(None)
 
     def read_directly(
         self, scene: Scene, joint: int, recordings: Sequence[PreparedRecording], rotor_std: float
     ) -> Mapping[str, Parameter]:
-        """Return a joint's parameters that a channel of its own tells without the fit, ``rotor_std`` a share of its inertia."""
+        """Return a joint's parameters that a separate channel determines without the fit; ``rotor_std`` is a share of its inertia."""
         return {}
 
     def corrects_data(self, member: Member) -> bool:
-        """Whether it is taken out of the recordings instead of becoming a term of the model."""
+        """Whether it is corrected in the recordings instead of becoming a term of the model."""
         return False
 
     def corrected(self, recording: Recording, member: Member, value: Array) -> Recording:
@@ -379,21 +379,21 @@ class Effect(ABC):
         return True
 
     def negligible(self, scene: Scene, member: Member, value: Array) -> str | None:
-        """Say why coefficients are too small to speak of, however sure; None where they are not."""
+        """Return why coefficients are negligible, however significant; None if they are not."""
         return None
 
     def alike(self, value: Array, covariance: Array) -> tuple[Array, Array]:
-        """Return what of coefficients (k,) all recordings have alike, and its covariance: all, unless each has its own."""
+        """Return the part of coefficients (k,) that is common to all recordings, and its covariance; default: all."""
         return value, covariance
 
     def of_torque(self, signals: Signals, member: Member, torque: Array) -> Array | None:
-        """Return what the torque (n, N) of effects in the model adds to the columns, shape (n, k, N); None where that is nothing."""
+        """Return what the torque (n, N) of effects in the model adds to the columns, shape (n, k, N); None if nothing."""
         return None
 
     def distinguished_from(self, scene: Scene, member: Member) -> tuple[tuple[Effect, Member], ...]:
-        """Return what is no part of an arm and may look like it in the lower part of the band, beside which it is estimated there."""
+        """Return an imitation, no property of the arm, that is fitted with it when it is estimated in the lower part of the band."""
         return ()
 
     def leaves(self, scene: Scene, member: Member, value: Array) -> tuple[Effect, Member, float] | None:
-        """Return what may be left of it in corrected recordings and is no part of an arm, and the band, Hz, that holds that."""
+        """Return what may be left of it in corrected recordings, no property of the arm, and the band, Hz, that contains it."""
         return None

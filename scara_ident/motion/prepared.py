@@ -1,7 +1,7 @@
-"""Recordings made ready for one choice of bands: everything that does not depend on a model, each part made once.
+"""Recordings prepared for one choice of bands: everything that does not depend on a model, each part computed once.
 
-Both sides of a joint's torque equation are faded out towards rest, where friction is unknown, and towards the ends, where the
-acceleration is, and then low-passed at the joint's band. Of the low-passed samples only as many are kept as the band leaves independent; they stand in blocks of
+Both sides of a joint's torque equation are faded out towards rest, where friction is unknown, and towards the ends,
+where the acceleration is unknown, and then low-passed at the joint's band. Of the low-passed samples only as many are kept as the band leaves independent; they stand in blocks of
 time, long against the filter's memory.
 """
 
@@ -26,18 +26,18 @@ from scara_ident.motion.trajectories import Trajectories, trajectories_of
 from scara_ident.recording.recording import Recording
 from scara_ident.threads import made_once, side_by_side
 
-# Rows per period of the band that are kept: the filter lets little through above 1.25 of its cut-off.
+# Rows per period of the band that are kept: the filter passes little above 1.25 times its cutoff.
 ROWS_PER_PERIOD = 2.5
-# Samples per period of the band that are enough of what follows from the motion smoothly, which has passed a low-pass of three times the
-# band: as few as leave every turn of a joint as it is, see `FEW_SAMPLES`.
+# Samples per period of the band for smooth functions of the motion, which has passed a low-pass of three times the
+# band: the smallest number that preserves every reversal of a joint, see `FEW_SAMPLES`.
 SMOOTH_PER_PERIOD = FEW_SAMPLES
 # Periods of the band left out at both ends of a stretch, where the filter's continuation is a guess, and the least
 # number of samples, where an unfiltered derivative rings.
 END_PERIODS = 1.0
 END_SAMPLES = 20
-# A rate is known to rounding only; what is a whole number but for that is one.
+# A rate is known only up to rounding; a number this near to a whole number counts as one.
 ROUNDING = 1e-9
-# Blocks are long against the band's memory, so that scores of different blocks are nearly independent.
+# Blocks are long compared with the memory of the band, so that scores of different blocks are nearly independent.
 BLOCK_PERIODS = 4.0
 BLOCK_SECONDS = 0.5
 
@@ -83,7 +83,7 @@ class PreparedStretch:
         return replace(self, bands=tuple(bands), rests_as=rests_as)
 
     def with_torque_of(self, stretch: Stretch) -> PreparedStretch:
-        """Return it with a stretch that differs by its torque alone; what the motion decides is shared."""
+        """Return it with a stretch that differs only in torque; results that depend on the motion alone are shared."""
         shared = {name: made for name, made in self.__dict__.items() if name not in ("stretch", "decimated")}
         found = replace(self, stretch=stretch)
         found.__dict__.update(shared, motion=self.motion.with_torque(stretch.torque))
@@ -94,7 +94,7 @@ class PreparedStretch:
     def with_positions_of(self, stretch: Stretch, factor: Array, shift: Array) -> PreparedStretch:
         """Return it with a stretch whose positions are ``factor`` times these, 1 or -1, and ``shift``, shape (n,) each.
 
-        Filters are linear and keep what is constant, so that what these positions decide is shared.
+        Filters are linear and preserve constants, so results that depend on these positions are shared.
         """
         sign = factor[:, None]
         moved = replace(
@@ -141,12 +141,12 @@ class PreparedStretch:
 
     @made_once
     def rest(self) -> NDArray[np.bool_]:
-        """Where each joint stands still, shape (n, N), widened by the memory of the position's filter, or is left out."""
+        """Where each joint stands still, widened by the memory of the position's filter, or is left out, shape (n, N)."""
         return np.asarray((self._moving == 0.0) | self.left_out)
 
     @made_once
     def fade(self) -> Array:
-        """Weight of both sides of the equation, shape (n, N): `moving`, less towards the ends, see `at_ends`."""
+        """Weight of both sides of the equation, shape (n, N): `moving`, reduced towards the ends, see `at_ends`."""
         return self.moving * at_ends(self.samples, self.trim)
 
     @property
@@ -161,26 +161,26 @@ class PreparedStretch:
 
     @made_once
     def used(self) -> NDArray[np.bool_]:
-        """Samples that say something, shape (n, N): neither at rest nor at the ends."""
+        """Samples that are used, shape (n, N): neither at rest nor at the ends."""
         used = ~self.rest
         used[:, : self.trim] = used[:, max(self.trim, self.samples - self.trim) :] = False
         return used
 
     @made_once
     def steps(self) -> tuple[int, ...]:
-        """How many samples one kept row of each joint stands for."""
+        """Number of samples per kept row of each joint."""
         return tuple(row_step(self.rate, band) for band in self.bands)
 
     @made_once
     def decimation(self) -> int:
-        """How many samples one of `decimated` stands for: as many as the band allows of which every step is a multiple."""
+        """Number of samples per sample of `decimated`: as many as the band allows, such that every step is a multiple of it."""
         widest = max(np.inf if band is None else band for band in self.bands)
         most = int(self.rate / (SMOOTH_PER_PERIOD * widest) * (1.0 + ROUNDING))
         return max((every for every in range(2, most + 1) if not any(step % every for step in self.steps)), default=1)
 
     @made_once
     def decimated(self) -> Motion:
-        """The motion at as many samples as what follows from it smoothly needs within the bands; often itself."""
+        """The motion at the samples that smooth functions of it need within the bands; often the motion itself."""
         every = self.decimation
         if every == 1:
             return self.motion
@@ -190,7 +190,7 @@ class PreparedStretch:
         return None if self.motion.torque is None else self.decimate(self.motion.torque)
 
     def decimate(self, signals: Array) -> Array:
-        """Return signals (k, N) at as few samples as `decimated` has, without what is faster, which would come back as something slow."""
+        """Return signals (k, N) at the samples of `decimated`, low-passed against aliasing."""
         return low_pass_every(signals, self.rate, HIGHEST_CUT * self.rate / self.decimation, self.decimation)
 
     @made_once
@@ -206,7 +206,7 @@ class PreparedStretch:
         return tuple(step * np.flatnonzero(own[::step]) for own, step in zip(self.used, self.steps, strict=True))
 
     def block_starts(self, joint: int) -> NDArray[np.intp]:
-        """Return where each block begins among the kept rows of a joint, shape (blocks + 1,)."""
+        """Return the first kept row of a joint in each block, shape (blocks + 1,)."""
         return np.asarray(np.searchsorted(self.kept[joint], self.blocks), dtype=np.intp)
 
     def rows(self, joint: int, signals: Array, every: int = 1) -> Array:
@@ -218,7 +218,7 @@ class PreparedStretch:
         signals : ndarray, shape (k, N)
             Columns of the joint's equation, or its torque.
         every : int, optional
-            They are given at every so many samples, 1 or `decimation`.
+            The signals are given at every so many samples, 1 or `decimation`.
         """
         step, band, fade = self.steps[joint], self.bands[joint], self.fade[joint, ::every]
         rows = low_pass_every(signals, self.rate / every, band, step // every, fade)
@@ -227,10 +227,10 @@ class PreparedStretch:
         return rows
 
     def rows_of(self, signals: Sequence[tuple[int, Array]], every: int = 1) -> list[Array]:
-        """Return what `rows` does of single signals, each given with its joint; those of a joint pass the filter together."""
+        """Return the result of `rows` for single signals, each given with its joint; those of a joint are filtered together."""
         own = [[place for place, (k, _) in enumerate(signals) if k == joint] for joint in range(len(self.bands))]
         parts = [part[k : k + ROWS_AT_ONCE] for part in own for k in range(0, len(part), ROWS_AT_ONCE)]
-        # Made once, and not in two threads.
+        # Computed once, and not in two threads.
         _ = self.fade, self.kept
 
         def passed(places: list[int]) -> Array:
@@ -274,7 +274,7 @@ class PreparedRecording:
         return max(self.stretches, key=lambda part: part.samples)
 
     def at(self, bands: Bands) -> PreparedRecording:
-        """Return it in other bands; what does not depend on them is shared."""
+        """Return it in other bands; results that do not depend on the bands are shared."""
         if tuple(bands) == self.bands:
             return self
         return replace(self, stretches=tuple(part.at(bands) for part in self.stretches))
@@ -385,11 +385,11 @@ def _check_bands(bands: Bands, joints: Sequence[str]) -> None:
 
 
 def block_seconds(bands: Sequence[float | None]) -> float:
-    """Return how long blocks of time are, s."""
+    """Return the length of the blocks of time, s."""
     slowest = min((band for band in bands if band is not None), default=np.inf)
     return float(max(BLOCK_SECONDS, BLOCK_PERIODS / slowest))
 
 
 def row_step(rate: float, band: float | None) -> int:
-    """Return how many samples one row stands for in a band."""
+    """Return the number of samples per row in a band."""
     return 1 if band is None else max(1, int(rate / (ROWS_PER_PERIOD * band) * (1.0 + ROUNDING)))

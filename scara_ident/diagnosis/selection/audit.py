@@ -1,4 +1,4 @@
-"""The audit of a selection: each effect is tested again beside all others, and removed if it fails."""
+"""The audit of a selection: each effect is tested again with all others in the model, and removed if it fails."""
 
 from __future__ import annotations
 
@@ -28,24 +28,25 @@ from scara_ident.estimation.run_variation import MIN_RUNS
 
 
 def unsettled(found: Search, weights: Array) -> list[Decision]:
-    """Return the decisions on effects in the model that do not stand beside the others, with why.
+    """Return the decisions on effects in the model that fail with all others in the model, with the reasons.
 
-    When an effect came in, others that came later were still missing, whose torque it may have stood for.
+    When an effect was accepted, later ones were still missing, and it may have stood for their torque.
 
     Parameters
     ----------
     weights : ndarray, shape (n,)
-        Of each joint's rows in the last fit.
+        Weights of each joint's rows in the last fit.
     """
     step = replace(found.step, weights=weights)
     if not step.chosen:
         return []
-    # Whether runs that differ make it is asked of it alone, on rows that weigh them as noise.
+    # Differences between runs are tested for each effect separately, on rows that treat them as noise.
     coefficients = physical_parameters(step, of_runs=False, of_noise=False).coefficients
     noise = noisy(step.observations.data)
     free = [noise and bool(item.effect.nonlinear) and not item.effect.together for item in step.chosen]
     moved = physical_parameters(step, of_runs=False).coefficients if any(free) else coefficients
-    # One of several that act together may mend what another lacks: then scatter alone does not say how unsure it is.
+    # One of several that act together may correct the errors of another; then its scatter underestimates its
+    # uncertainty.
     sizes = physical_parameters(step).effects if len(step.scene.together) > 1 else ()
     result = []
     for place, (candidate, own) in enumerate(zip(step.chosen, coefficients, strict=True)):
@@ -71,15 +72,15 @@ def unsettled(found: Search, weights: Array) -> list[Decision]:
 
 
 def _moved_by_noise(own: Coefficients, examination: Examination, essential: slice, least: float) -> str | None:
-    """Say so where the noise of the positions moves an effect by as much as it is, with all its parameters free.
+    """Return the reason if the bias by the noise of the positions is as large as an effect, with all its parameters free.
 
-    With these held, `noise_objection` sees less: what of a size lies where no row is, such as that of friction near rest behind a coarse
-    encoder, goes to any value with them.
+    With these parameters held, `noise_objection` underestimates the bias: the part of a size that no row determines,
+    such as friction near rest with a coarse encoder, changes freely with them.
 
     Parameters
     ----------
     own : Coefficients
-        With what the noise does in their covariance.
+        With the bias by the noise in their covariance.
     examination, essential, least
         See `uncertain`.
     """
@@ -90,20 +91,20 @@ def _moved_by_noise(own: Coefficients, examination: Examination, essential: slic
 
 
 def _unsized(step: SelectionStep, candidate: Candidate, sizes: Mapping[str, Parameter]) -> str | None:
-    """Say so where the size of one of several effects that act together is not determined: it may mend what another lacks."""
+    """Return the reason if the size of one of several effects that act together is not determined: it may only correct another's error."""
     if size_is_determined(candidate.effect, sizes, step.criteria.min_size):
         return None
     return "its size is within its uncertainty beside the effects that it acts with: it may only correct their errors"
 
 
 def _repeated(step: SelectionStep, decision: Decision) -> str | None:
-    """Say so where only repetitions make an effect significant: what a model lacks repeats with the motion as well."""
+    """Return the reason if only repetitions make an effect significant: a missing effect repeats with the motion too."""
     data, criteria = step.observations.data, step.criteria
     motions = len(data.trajectories)
     if motions == len(data.recordings) and not any(data.periods):
         return None
-    # Of one motion alone, no other says otherwise: it counts as recorded once. Else what hardly leaves anything stands for
-    # nothing that repeats.
+    # A single motion counts as recorded once, because no other motion can contradict it. Otherwise an effect that
+    # leaves almost nothing cannot stand for something that repeats.
     if motions > 1 and decision.gain >= criteria.nearly_all:
         return None
     p_value = examine_moments(step, decision.candidate).p_value
@@ -113,22 +114,22 @@ def _repeated(step: SelectionStep, decision: Decision) -> str | None:
 
 
 def outdone(found: Search, weights: Array, refused: Sequence[Decision]) -> list[Decision]:
-    """Return the decisions on effects in whose place one that is not believed, or what is no effect, does as well, with why.
+    """Return the decisions on effects that a refused effect, or an imitation that is no effect, explains as well, with the reasons.
 
-    What was refused may have been there all the same, and what is found without it then stands for it; as for what an effect
-    was not believed for, see `imitators`.
+    A refused effect may be there after all, and an effect that is found without it then stands for it; for imitations
+    see `imitators`.
 
     Parameters
     ----------
     found : Search
-        Without the effects that are not believed.
+        The search without the effects that are not believed.
     weights : ndarray, shape (n,)
         See `unsettled`.
     refused : sequence of Decision
-        On the effects that are not believed.
+        Decisions on the effects that are not believed.
     """
     step = replace(found.step, weights=weights)
-    # What turns within a step of the encoder is not there: it mends friction's sign, as some of what is there does too.
+    # An effect within a step of the encoder is not real: it corrects the sign of friction, as some real effects do too.
     alternatives = [item.candidate for item in refused if within_a_step(step, item.candidate) is None]
     tried = [item.candidate for item in best_of_each(found.decisions).values()]
     listed_nowhere = imitators(replace(step, chosen=()), tried) if step.chosen else []
@@ -140,7 +141,7 @@ def outdone(found: Search, weights: Array, refused: Sequence[Decision]) -> list[
         saved = own.examination.held_out
         for other in sorted(others, key=lambda item: -item.examination.held_out):
             unlisted = other.candidate in listed_nowhere
-            # What nobody believed, and is an effect, need not do all of it; what is none has to do it all.
+            # A refused effect need not explain all of it; an imitation that is no effect must.
             if other.examination.held_out >= (1.0 if unlisted else step.criteria.min_share) * saved:
                 what = other.candidate.effect.summary if unlisted else f"{other.label}, which is not believed,"
                 result.append(own.refused(f"{what} explains as much in its place"))
@@ -149,10 +150,10 @@ def outdone(found: Search, weights: Array, refused: Sequence[Decision]) -> list[
 
 
 def beaten_by_its_like(found: Search, weights: Array) -> list[Decision]:
-    """Return the decisions on effects in whose place the same of another joint explains more by more than chance, with why.
+    """Return the decisions on effects for which the same effect on another joint explains significantly more, with the reasons.
 
-    Of those that act together one stands for another, and a search believes the one that its tests let in, by however little.
-    Coarse fits hardly tell them apart, so that all are fitted to the end here.
+    Of effects that act together one may stand for another, and a search accepts the one that passes its tests, by
+    however little. Coarse fits hardly distinguish them, so all are fitted completely here.
 
     Parameters
     ----------
@@ -185,9 +186,10 @@ def beaten_by_its_like(found: Search, weights: Array) -> list[Decision]:
 
 
 def beaten_by_impossible(found: Search, weights: Array) -> list[Decision]:
-    """Return the decisions on effects in whose place one that no arm has explains more, with why.
+    """Return the decisions on effects for which an impossible effect explains more, with the reasons.
 
-    It explains much beside them too: what the arm has is like that one, is none of the catalogue, and they stand for it.
+    It explains much in addition to them too: the arm has something similar that is not in the catalogue, and they stand
+    for it.
 
     Parameters
     ----------
@@ -208,7 +210,7 @@ def beaten_by_impossible(found: Search, weights: Array) -> list[Decision]:
         if near:
             beside = step.without(place)
             own, *others = beside.judge([candidate, *near])
-            # What is believed has its best nonlinear parameters.
+            # The effects in the model have their best nonlinear parameters.
             best = max(beside.refine(others), key=lambda item: item.examination.held_out)
             if best.examination.held_out > own.examination.held_out:
                 result.append(own.refused(f"{best.label} explains more in its place, but is impossible: {best.why}"))
@@ -216,7 +218,7 @@ def beaten_by_impossible(found: Search, weights: Array) -> list[Decision]:
 
 
 def suspected(found: Search, weights: Array) -> list[Decision]:
-    """Return the decisions on what would be let in beside the effects found, did the recordings hold enough of it.
+    """Return the decisions on effects that would be accepted in addition if the recordings excited them enough.
 
     Parameters
     ----------
@@ -229,20 +231,20 @@ def suspected(found: Search, weights: Array) -> list[Decision]:
 
 
 def left_open(found: Search, weights: Array, demoted: Sequence[Decision] = ()) -> list[Decision]:
-    """Return the decisions on what is not believed, though it is no noise, with that in words.
+    """Return the decisions on effects that are not believed although they are more than noise, with a sentence.
 
-    Beside the effects found it would remove as much as is asked and is worth a look, and neither the noise of the positions
-    makes it nor what runs were seen to differ by, nor what may be left of a correction of the data: what is left is not shown to be
-    noise, whatever it looks like.
+    With the effects found in the model it has the required gain and is worth a look, and it is not caused by the noise
+    of the positions, by differences between runs or by the rest of a correction. So the residual is not shown to be
+    noise, whatever its spectrum.
 
     Parameters
     ----------
     weights : ndarray, shape (n,)
         See `unsettled`.
     demoted : sequence of Decision, optional
-        On effects that the search had found and did without in the end; what came in since may have made them nothing.
+        Decisions on effects that the search had found and removed in the end; later effects may have replaced them.
     """
-    # What noise or runs would make is asked no more than it is itself: it need not be sure of it to be possible.
+    # To excuse an effect, noise or runs need only be able to cause it; this need not be significant.
     of_one = replace(found.step.criteria, family_error=found.step.criteria.significant)
     step = replace(found.step, weights=weights, criteria=of_one)
     differing = len(step.observations.data.recordings) >= MIN_RUNS
@@ -268,7 +270,7 @@ def left_open(found: Search, weights: Array, demoted: Sequence[Decision] = ()) -
 
 
 def superfluous(found: Search, weights: Array, others: Sequence[Decision]) -> list[Decision]:
-    """Return the decisions on effects in whose place one that is suspected explains more, so that they add nothing, with why.
+    """Return the decisions on effects for which a suspected effect explains more, so that they add nothing, with the reasons.
 
     Parameters
     ----------
@@ -292,20 +294,20 @@ def superfluous(found: Search, weights: Array, others: Sequence[Decision]) -> li
 
 
 def uncertain(own: Coefficients, examination: Examination, essential: slice, least: float) -> str | None:
-    """Say so where an effect's coefficients are not beyond their final uncertainty.
+    """Return the reason if an effect's coefficients are within their final uncertainty.
 
-    That is the uncertainty beside all that was found, nonlinear parameters free. The
-    coefficients are asked together, by Wald's statistic with the degrees of freedom of blocks (`significance`); none is
-    all of them zero, whatever the physical parameters are then, and phases, orders and times do not count.
+    That is the uncertainty with all effects found in the model and nonlinear parameters free. The coefficients are
+    tested together, by Wald's statistic with the degrees of freedom of blocks (`significance`). The null hypothesis is
+    that all are zero, whatever the physical parameters are then; phases, orders and times are not tested.
 
     Parameters
     ----------
     examination : Examination
         Of the effect beside all others.
     essential : slice
-        The coefficients that are asked, see `Effect.essential`.
+        The coefficients that are tested, see `Effect.essential`.
     least : float
-        Standard deviations that one coefficient would have to lie from zero, beyond which many blocks let so few by.
+        Standard deviations from zero that are required of one coefficient with many blocks.
     """
     p_value = _chance(own, examination, essential)
     if p_value <= _of_normal(least):
@@ -314,16 +316,16 @@ def uncertain(own: Coefficients, examination: Examination, essential: slice, lea
 
 
 def _chance(own: Coefficients, examination: Examination, essential: slice) -> float:
-    """Return the probability that coefficients which are none would be as large, see `uncertain`."""
+    """Return the probability that coefficients whose true value is zero would be as large, see `uncertain`."""
     value, covariance = own.value[essential], own.covariance[essential, essential]
     if not np.array_equal(examination.tested, examination.value):
-        # The freedom is that of weighted blocks, which are less sure.
+        # The degrees of freedom are those of weighted blocks, which are fewer.
         covariance = covariance + examination.covariance[essential, essential]
     return significance(value, covariance, examination.freedom, examination.products[essential, essential])
 
 
 def _of_normal(stds: float) -> float:
-    """Return the probability that a normal variable lies so many standard deviations off, either way."""
+    """Return the two-sided probability that a normal variable is so many standard deviations from its mean."""
     from scipy.special import erfc
 
     return float(erfc(stds / 2.0**0.5))

@@ -1,4 +1,4 @@
-"""Which candidate enters next: the best families refined, and none that noise or differences between runs produce."""
+"""Which candidate is accepted next: the best families are refined, and none that noise or differences between runs cause is accepted."""
 
 from __future__ import annotations
 
@@ -34,16 +34,17 @@ def choose(
     step : SelectionStep
         The model so far.
     decisions : sequence of Decision
-        On all that may come in.
+        Decisions on all candidates that may be accepted.
     known : SelectionStep or None
         See `fitted_beside`.
 
     Returns
     -------
     tuple of (Decision or None, dict, Scene)
-        The best acceptable member that is sound, those better that are not by their labels, and the scene to go on with.
+        The best acceptable member without an objection, the better ones with an objection by their labels, and the
+        scene for the next step.
     """
-    # Families of one name each: which of them is better is seen once they are refined.
+    # Several families of one name: which of them is better is known after refinement.
     by_family: dict[Effect, list[Decision]] = {}
     for item in decisions:
         by_family.setdefault(item.candidate.effect, []).append(item)
@@ -64,7 +65,7 @@ def choose(
         winner = _soundest(step, open_, refused)
         if winner is not None:
             return winner[1], refused, winner[0].scene
-        # What no fit was spent on would come in by its grid points: where nothing better does it is fitted after all.
+        # A family that was not fitted would be accepted by its grid point: if nothing is better, it is fitted now.
         found = fitted_beside(step, [item for item in first if item.accepted and item.label not in fitted], 0.0, None)
         if not found:
             return None, refused, step.scene
@@ -76,10 +77,10 @@ def choose(
 def _soundest(
     step: SelectionStep, open_: Sequence[tuple[SelectionStep, Decision]], refused: dict[str, Decision]
 ) -> tuple[SelectionStep, Decision] | None:
-    """Return the best of some decisions to which nothing is objected, refined; those better are added to the refused."""
+    """Return the best decision without an objection, refined; better ones are added to the refused."""
     criteria = step.criteria
     open_ = sorted(open_, key=lambda pair: -pair[1].examination.held_out)
-    # Where the best are refused, the next best may still be sound.
+    # If the best are refused, the next best may have no objection.
     while open_:
         enough = criteria.near_best * open_[0][1].examination.held_out
         leaders = [pair for pair in open_ if pair[1].examination.held_out >= enough][: criteria.max_refined]
@@ -109,7 +110,7 @@ def _soundest(
 def _by_other_laws(
     step: SelectionStep, found: Sequence[tuple[SelectionStep, Decision]]
 ) -> list[tuple[SelectionStep, Decision]]:
-    """Return those of some fits by another law of the last effect that are accepted: a law changes what all else is fitted to."""
+    """Return the accepted fits with another law of the last effect: a law influences all other parameters."""
     pairs = [
         (own, replace(item.candidate, effect=law)) for own, item in found for law in item.candidate.effect.other_laws()
     ]
@@ -118,7 +119,7 @@ def _by_other_laws(
 
 
 def _plainer_first(order: Sequence[tuple[SelectionStep, Decision]]) -> list[tuple[SelectionStep, Decision]]:
-    """Put the plainer of two of the same effect first where the other leaves no less than chance makes, see `_is_plainer`."""
+    """Put the simpler of two of the same effect first if the other does not leave significantly less, see `_is_plainer`."""
     left, put = list(order), []
     while left:
         plainer = [pair for pair in left[1:] if _is_plainer(pair[1], left[0][1]) and same(left[0], pair)]
@@ -129,10 +130,10 @@ def _plainer_first(order: Sequence[tuple[SelectionStep, Decision]]) -> list[tupl
 
 
 def _is_plainer(one: Decision, other: Decision) -> bool:
-    """Whether one of two of the same effect is without intervals, or by the law of its name.
+    """Whether one of two of the same effect has no intervals, or has the standard law of its name.
 
-    Where intervals begin and end all rows determined, those held out among them, so that what they remove there says too much. A
-    law is given, and has to be determined.
+    The begin and end of intervals were determined by all rows, including the held-out ones, so their gain is too large.
+    The standard law needs no such choice; another law must be determined by the data.
     """
     effect, more = one.candidate.effect, other.candidate.effect
     if effect.name != more.name:
@@ -142,9 +143,9 @@ def _is_plainer(one: Decision, other: Decision) -> bool:
 
 
 def _sure_once_refined(step: SelectionStep, best: Sequence[Decision], enough: float) -> list[Decision]:
-    """Return those worth a look that are sure beside their grid point, which may lose most of their significance.
+    """Return those worth a look that become significant near their grid point, which may lose most of their significance.
 
-    Every point on the way there is one more that was tried.
+    Every point of the refinement counts as tried.
     """
     criteria = step.criteria
     worth = [
@@ -164,21 +165,21 @@ def _sure_once_refined(step: SelectionStep, best: Sequence[Decision], enough: fl
 def fitted_beside(
     step: SelectionStep, candidates: Sequence[Decision], best: float, known: SelectionStep | None
 ) -> list[tuple[SelectionStep, Decision]]:
-    """Fit those of some candidates that promise something, all else with them, and judge them there.
+    """Fit the promising candidates together with everything else, and judge them there.
 
     Parameters
     ----------
     candidates : sequence of Decision
-        Grid points of families that are fitted first.
+        Grid points of families that need a fit first.
     best : float
         Largest gain among the other families.
     known : SelectionStep or None
-        Where an earlier search in other bands ended: fits may begin there.
+        The end of an earlier search in other bands, as a starting point of fits.
 
     Returns
     -------
     list of (SelectionStep, Decision)
-        With the step at the estimate that goes with the candidate.
+        Each with the step at the estimate that was fitted with the candidate.
     """
     criteria = step.criteria
     enough = max(criteria.min_gain, criteria.near_best * best)
@@ -188,14 +189,14 @@ def fitted_beside(
 def _each_fitted(
     step: SelectionStep, worth: Sequence[Decision], candidates: Sequence[Decision], known: SelectionStep | None
 ) -> list[tuple[SelectionStep, Decision]]:
-    """Return what `fitted_beside` does of those of the candidates that are worth it."""
+    """Return the result of `fitted_beside` for the candidates that are worth a fit."""
     begins = {item.label: (step, item.candidate) for item in worth}
     if known is not None:
-        # Found in another band: from there it is near.
+        # It was found in another band, so its fit starts near the solution.
         scene = replace(step.scene, value=known.scene.value, armatures=known.scene.armatures)
         labels = {item.label for item in candidates}
         for item in (item for item in known.chosen if item.label(scene) in labels):
-            # One of several that act together may be sure only beside the others.
+            # One of several that act together may be significant only with the others in the model.
             others = [other for other in known.chosen if other.effect.together and other.label(scene) in labels]
             beside = [other for other in others if item.effect.together and other is not item]
             begins[item.label(scene)] = replace(step, scene=scene, chosen=(*step.chosen, *beside)), item
@@ -210,9 +211,9 @@ def _each_fitted(
 
 
 def _min_left(found: Sequence[tuple[SelectionStep, Decision]]) -> list[tuple[SelectionStep, Decision]]:
-    """Return of several fits of the same effects the one that leaves the least.
+    """Return the fit with the smallest residual of several fits of the same effects.
 
-    What the last gains beside the others does not say which: beside others in a wrong minimum it may gain all.
+    The gain of the last effect does not decide: with the others in a wrong minimum it may gain everything.
     """
     best: dict[frozenset[str], tuple[SelectionStep, Decision]] = {}
     for own, decision in found:
@@ -228,7 +229,7 @@ def _left(decision: Decision) -> float:
 
 
 def _if_more(step: SelectionStep, decision: Decision) -> Decision:
-    """Return a decision on what was fitted with the model of a step, refused where both leave as much as that alone."""
+    """Return a decision on what was fitted with the model of a step, refused if both leave as much as that model alone."""
     before, left = float(np.sum(step.model.squares)), _left(decision)
     if decision.accepted and before - left < step.criteria.min_gain * before / step.scene.robot.n:
         return replace(decision, accepted=False, why="takes the place of an effect in the model")
@@ -236,7 +237,7 @@ def _if_more(step: SelectionStep, decision: Decision) -> Decision:
 
 
 def fitted_with(step: SelectionStep, candidate: Candidate, *, coarse: bool = False) -> tuple[SelectionStep, Decision]:
-    """Fit a candidate with all else, and judge it beside the others as they are fitted with it.
+    """Fit a candidate with everything else, and judge it with the others as they are fitted with it.
 
     Parameters
     ----------
@@ -247,13 +248,14 @@ def fitted_with(step: SelectionStep, candidate: Candidate, *, coarse: bool = Fal
     """
     fitted = tune(replace(step, chosen=(*step.chosen, candidate)), coarse=coarse)
     own = fitted.without(len(step.chosen))
-    # What it is judged by is as large as all rows, and of several fits one is asked again: it goes with the copy.
+    # The data for this decision are as large as all rows, and only one of several fits is used again, so they are
+    # released with the copy.
     (decision,) = replace(own).judge([fitted.chosen[-1]])
     return own, decision
 
 
 def objection(step: SelectionStep, decision: Decision) -> str | None:
-    """Say why a candidate that its tests let in does not come in all the same; None where it does.
+    """Return the objection to a candidate that passed its tests; None if there is none.
 
     Parameters
     ----------
@@ -272,10 +274,10 @@ def objection(step: SelectionStep, decision: Decision) -> str | None:
 
 
 def more_than_chance(point: Decision, tried: int, criteria: SelectionCriteria) -> bool:
-    """Whether a grid point may stand for something, so that work on its family may be worth it.
+    """Whether a grid point is significant enough to refine its family.
 
-    Where few blocks hold most of a column, as those of a jerk at the end of a dwell do, chance may do as well whatever it
-    removes; the fit, which has to be sure, then decides.
+    If few blocks contain most of a column, such as those of a jerk at the end of a dwell, it may be chance whatever it
+    removes; the fit, which must be significant, then decides.
     """
     return point.gain > 0.0 and (point.examination.p_value * tried <= 1.0 or point.gain >= criteria.dominant)
 
@@ -283,9 +285,10 @@ def more_than_chance(point: Decision, tried: int, criteria: SelectionCriteria) -
 def _worth_fitting(
     points: Sequence[Decision], enough: float, tried: int, criteria: SelectionCriteria
 ) -> list[Decision]:
-    """Return the best points of those that promise so much gain and what they may stand for, the most promising first."""
-    # A fit is dear. Of a resonance with little damping a grid point loses most, or is unsure where it removes most, as its
-    # waves are others in every run; a point beside it, or the same of another joint, may be more than chance would bring.
+    """Return the best points with a promising gain, and those that they may stand for, the most promising first."""
+    # A fit is expensive. For a resonance with little damping a grid point loses most of the gain, or is not significant
+    # where it removes most, because its waves differ in every run; a neighbouring point, or the same on another joint,
+    # may be significant.
     sure = {item.candidate.effect.name for item in points if more_than_chance(item, tried, criteria)}
     best = [item for item in best_of_each(points).values() if item.candidate.effect.name in sure]
     large = {item.candidate.effect.name for item in best if item.gain >= enough}
@@ -294,10 +297,10 @@ def _worth_fitting(
 
 
 def _promising(step: SelectionStep, points: Sequence[Decision]) -> list[Decision]:
-    """Return the best points, more than chance would bring, of those that act together with effects in the model.
+    """Return the best significant points of those that act together with effects in the model.
 
-    These were fitted as if there were no others: what a candidate would add is seen once they may give way. How much that is
-    the fit says.
+    The effects in the model were fitted as if there were no others: the gain of a candidate is known only after they
+    are fitted again.
     """
     if not points:
         return []
@@ -308,7 +311,7 @@ def _promising(step: SelectionStep, points: Sequence[Decision]) -> list[Decision
 
 
 def _in_place_of_the_last(step: SelectionStep, points: Sequence[Decision]) -> list[tuple[SelectionStep, Decision]]:
-    """Fit two effects that act together in the place of the last that came in, which may stand for both; see `Effect.instead`."""
+    """Fit two effects that act together in the place of the last accepted one, which may stand for both; see `Effect.instead`."""
     last = step.chosen[-1] if step.chosen else None
     labels = {item.label for item in points}
     if last is None or not last.effect.together or not points:
@@ -324,10 +327,10 @@ def _in_place_of_the_last(step: SelectionStep, points: Sequence[Decision]) -> li
 
 
 def _left_again(step: SelectionStep, decision: Decision) -> str | None:
-    """Say so where much of a correction is left once it was made: of one that is there it is a term of third order.
+    """Return the reason if much of a correction is left after it was made: for a true one only a term of third order is left.
 
-    The noise of positions in its column makes the first estimate too small by its share of the column's square, and what is left
-    as much larger (Fuller, Measurement Error Models, 1987).
+    The noise of positions in its column makes the first estimate too small by its share of the column's square, and the
+    rest larger by as much (Fuller, Measurement Error Models, 1987).
     """
     candidate, first = decision.candidate, decision.examination.value
     if not candidate.corrects_data:
@@ -337,7 +340,7 @@ def _left_again(step: SelectionStep, decision: Decision) -> str | None:
     else:
         hidden = min(max(noise_of_column(step, decision), 0.0), 1.0 - MIN_RELIABILITY)
     whole = taken_out(step, candidate)[1].value
-    # Between what the first says and what it would be without that noise, which is known roughly, all is as good.
+    # Any value between the first estimate and its value without that noise, which is known roughly, is acceptable.
     expected = np.clip(whole, *np.sort([first, first / (1.0 - hidden)], axis=0))
     if np.max(np.abs(whole - expected)) <= step.criteria.lower_change * np.max(np.abs(expected)):
         return None
@@ -347,7 +350,7 @@ def _left_again(step: SelectionStep, decision: Decision) -> str | None:
 
 
 def _insignificant(step: SelectionStep, candidate: Candidate) -> str | None:
-    """Say so where the size of an effect is within its uncertainty, that of its nonlinear parameters included."""
+    """Return the reason if the size of an effect is within its uncertainty, including that of its nonlinear parameters."""
     if not candidate.effect.nonlinear:
         return None
     if size_is_determined(candidate.effect, parameters_beside(step, candidate), step.criteria.min_size):

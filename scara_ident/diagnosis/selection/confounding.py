@@ -1,4 +1,4 @@
-"""Effects that these recordings cannot tell apart."""
+"""Effects that these recordings cannot distinguish."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ from scara_ident.processes import halved
 
 @dataclass(frozen=True)
 class Confounder:
-    """An effect that would do nearly as well as one that was found.
+    """An effect that would explain nearly as much as one that was found.
 
     Attributes
     ----------
     label, effect : str
     joint : str or None
     gain : float
-        Of it in the place of the effect found; see `gains`.
+        Gain in the place of the effect found; see `gains`.
     candidate : Candidate
     value : tuple of float
-        Its coefficients in the place of the effect found; none where it is in the model beside it.
+        Its coefficients in the place of the effect found; empty if it is also in the model.
     """
 
     label: str
@@ -45,16 +45,16 @@ class Confounder:
 def confounders(
     step: SelectionStep, decisions: Sequence[Decision], first: Scene, doubtful: Sequence[Candidate] = ()
 ) -> list[tuple[Confounder, ...]]:
-    """Return for each chosen effect those that these recordings cannot tell from it.
+    """Return for each chosen effect those that these recordings cannot distinguish from it.
 
     Parameters
     ----------
     step : SelectionStep
-        The model with the effects that stayed.
+        The model with the kept effects.
     decisions : sequence of Decision
-        On the candidates that were tried beside it.
+        Decisions on the candidates that were tried with it.
     first : Scene
-        Where the columns of all of them are at hand.
+        The scene at which the columns of all of them are available.
     doubtful : sequence of Candidate, optional
         See `Effect.doubtful`.
     """
@@ -68,10 +68,10 @@ def confounders(
 
 
 def _cancelling(step: SelectionStep) -> list[tuple[Confounder, ...]]:
-    """Return for each chosen effect those on its joint that take most of its torque back.
+    """Return for each chosen effect those on its joint that cancel most of its torque.
 
-    Two that nearly cancel stand for what is left of both, a curve that neither has: x cubed is x against its
-    sine, each of several times its size. What an offset takes up does not count.
+    Two that nearly cancel stand for their difference, a curve that neither has: x cubed is the difference of x and its
+    sine, each several times as large. A constant part, which an offset absorbs, does not count.
     """
     found: list[tuple[Confounder, ...]] = [() for _ in step.chosen]
     if len({item.member.joint for item in step.chosen}) == len(step.chosen):
@@ -103,24 +103,25 @@ def _cancelling(step: SelectionStep) -> list[tuple[Confounder, ...]]:
 def _confounders_of(
     step: SelectionStep, found: Candidate, pool: Sequence[Candidate], first: Scene, doubtful: Sequence[Candidate]
 ) -> tuple[Confounder, ...]:
-    # A confounder is asked for once, not in every round of a search, and need not be believed itself: how many others were tried
-    # says nothing of whether these two can be told apart. One of the whole arm need not remove as much as all joints leave.
+    # Confounders are tested once, not in every round of a search, and need not be believed themselves: the number of
+    # other candidates does not matter for distinguishing these two. One of the whole arm need not remove as much as all
+    # joints leave.
     scene, of_one = step.scene, replace(step.criteria, family_error=step.criteria.significant)
     criteria = replace(of_one, min_gain=of_one.min_gain / scene.robot.n)
     step = replace(step, criteria=criteria, tried=1)
-    # What a model fits of what runs differ by says nothing for it.
+    # Fitting differences between runs is no evidence for an effect.
     step = counted(step, step.judge([found])[0])
     own = step.judge([found])[0]
     twins = [Candidate(*twin) for twin in found.effect.same_columns(scene, found.member)]
-    # Of all joints together: candidates of different joints are compared. Those that remove too little, most of them, need
-    # no test.
+    # For all joints together, because candidates of different joints are compared. Most candidates remove too little
+    # and need no test.
     saved = own.examination.held_out
     judged = near_in_place(step, own, list(dict.fromkeys([*pool, *twins, *doubtful])), first)
     to_fit = [item for item in judged if item.candidate.effect.fitted_first]
-    # What is chosen by a fit is compared by one: its grid points lose most of it.
+    # Candidates that were chosen by a fit are compared by a fit, because their grid points lose most of the gain.
     fitted = fitted_beside(replace(step, criteria=of_one), to_fit, 0.0, None)
     near = [item for item in judged if item.accepted and item.examination.held_out > criteria.near_confounder * saved]
-    # Refined, what is doubtful would do what anything does over so little of it.
+    # After refinement a doubtful candidate fits almost anything over its few data.
     refined = step.refine(
         [item for item in near if not (item.candidate.effect.fitted_first or item.candidate in doubtful)]
     )

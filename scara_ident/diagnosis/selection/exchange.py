@@ -1,4 +1,4 @@
-"""Exchange of an effect for one that explains more in its place: what entered early was fitted without what entered later."""
+"""Exchange of an effect for one that explains more in its place: early effects were chosen without the later ones."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from scara_ident.diagnosis.testing.candidate_tests import held_out_gains
 from scara_ident.diagnosis.testing.selection_step import SelectionStep, best_of_each
 from scara_ident.effects import Scene
 
-# Of what the effect removes, less than this share more or less is rounding: two models of one span leave the same.
+# Differences below this share of what the effect removes are rounding: two models with the same span leave the same.
 ROUNDING = 1e-9
-# Columns that follow the base model's estimate instead of the last one gain at least this share of what they would.
+# Columns at the base model's estimate have at least this share of the gain that columns at the last estimate have.
 MIN_PRELIMINARY_SHARE = 0.5
 
 
@@ -29,13 +29,13 @@ class Exchange:
     Attributes
     ----------
     place : int
-        Of the effect that goes, among those chosen.
+        Index of the removed effect, among those chosen.
     decision : Decision
-        On the effect that comes.
+        Decision on the new effect.
     scene : Scene
-        To go on with.
+        The scene for the next step.
     saved : float
-        Weighted squared residual that it leaves less.
+        Reduction of the weighted squared residual.
     """
 
     place: int
@@ -47,18 +47,18 @@ class Exchange:
 def best_exchange(
     step: SelectionStep, pool: Sequence[Candidate], first: Scene, refused: Collection[str] = ()
 ) -> Exchange | None:
-    """Return the exchange that explains most more, or as much with fewer effects, all else fitted with it; None where none does.
+    """Return the exchange with the largest improvement, or as good with fewer effects, everything else fitted again; None if there is none.
 
     Parameters
     ----------
     step : SelectionStep
-        The model with all that came in.
+        The model with all accepted effects.
     pool : sequence of Candidate
-        All that may come.
+        All candidates that may replace an effect.
     first : Scene
         Where the columns of the pool are at hand.
     refused : collection of str, optional
-        Labels of what is not to be tried.
+        Labels of effects that must not be tried.
     """
     found = []
     held = {item.label(step.scene) for item in step.chosen} | set(refused)
@@ -72,7 +72,7 @@ def best_exchange(
             saved = float(np.sum(own.examination.left) - np.sum(decision.examination.left))
             saved = saved if abs(saved) > least else 0.0
             alike = same((beside, own), (other, decision))
-            # What does as well with fewer others is the better explanation of the two.
+            # Of two that explain as much, the one that needs fewer others is the better explanation.
             better = _fewer(count, other, decision) if alike else saved > 0.0
             if better and objection(other, decision) is None:
                 found.append(Exchange(place, decision, other.scene, saved))
@@ -80,7 +80,7 @@ def best_exchange(
 
 
 def needed(step: SelectionStep) -> tuple[Candidate, ...]:
-    """Drop, one at a time, effects that the others have made superfluous."""
+    """Remove, one at a time, effects that the others have made superfluous."""
     while len(step.chosen) > 1:
         decisions = [step.without(k).judge([item])[0] for k, item in enumerate(step.chosen)]
         weakest = min(range(len(decisions)), key=lambda k: decisions[k].gain)
@@ -91,14 +91,14 @@ def needed(step: SelectionStep) -> tuple[Candidate, ...]:
 
 
 def near_in_place(step: SelectionStep, found: Decision, pool: Sequence[Candidate], first: Scene) -> list[Decision]:
-    """Return the best grid point of each of those that remove nearly as much in the place of an effect.
+    """Return the best grid point of each candidate that removes nearly as much in the place of an effect.
 
     Parameters
     ----------
     step : SelectionStep
         The model without the effect.
     found : Decision
-        On the effect beside it.
+        Decision on the effect with this model.
     first : Scene
         Where the columns of the pool are at hand.
     """
@@ -109,7 +109,7 @@ def near_in_place(step: SelectionStep, found: Decision, pool: Sequence[Candidate
         gained = held_out_gains(step.model, step.rows_at_hand(columns, candidates), criteria)
         return [item for item, gain in zip(candidates, gained, strict=True) if gain > asked]
 
-    # By the columns at hand first: most come nowhere near, and need no others. But what the effect itself would do on
+    # First with the available columns: most candidates are far away and need no new columns. But the effect itself on
     # another joint depends on the model as it does here.
     alike = [item for item in pool if item.effect.name == effect.name]
     others = enough([item for item in pool if item.effect.name != effect.name], first, MIN_PRELIMINARY_SHARE * least)
@@ -119,7 +119,7 @@ def near_in_place(step: SelectionStep, found: Decision, pool: Sequence[Candidate
 def _fitted_alternatives(
     beside: SelectionStep, own: Decision, pool: Sequence[Candidate], first: Scene
 ) -> list[tuple[SelectionStep, Decision]]:
-    """Return those that come near an effect in its place once they are refined, with all else fitted with them."""
+    """Return those that explain nearly as much in the place of an effect after refinement, with everything else fitted again."""
     criteria = beside.criteria
     near = near_in_place(beside, own, pool, first)
     by_fit = fitted_beside(beside, [item for item in near if item.candidate.effect.fitted_first], 0.0, None)
@@ -132,6 +132,6 @@ def _fitted_alternatives(
 
 
 def _fewer(count: Callable[[], int], other: SelectionStep, decision: Decision) -> bool:
-    """Whether fewer effects than a count are needed with another in the place of one."""
-    # Of two, the other one is needed beside one that does as well.
+    """Whether fewer effects than a count are needed with a replacement."""
+    # With two effects, the other one is needed with a replacement that explains as much.
     return len(other.chosen) > 1 and len(needed(replace(other, chosen=(*other.chosen, decision.candidate)))) < count()

@@ -1,4 +1,4 @@
-"""Stepwise search: one effect after another, each time the one that helps most on folds that it was not fitted to."""
+"""Stepwise search: one effect after another, each time the one with the largest gain in cross-validation."""
 
 from __future__ import annotations
 
@@ -34,36 +34,36 @@ from scara_ident.motion.low_pass import HIGHEST_CUT
 from scara_ident.motion.prepared import PreparedData
 from scara_ident.progress import Work
 
-# The label of every effect that came in, and where the search stood before.
+# The label of every effect that was accepted, and the state of the search before.
 Passed: TypeAlias = "tuple[tuple[str, SearchState], ...]"
 
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """How the search went.
+    """The result of a search, with its steps.
 
     Attributes
     ----------
     step : SelectionStep
-        The model with the effects that stayed, its scene, its rows.
+        The model with the effects that were kept, its scene and its rows.
     uncorrected : Observations
         Of the base model, before any correction of the data.
     start : Estimate
         Of the base model.
     steps : tuple of Step
-        The effects let in, in their order.
+        The accepted effects, in their order.
     correction : Correction or None
-        What was taken out of the data.
+        What was corrected in the data.
     decisions : tuple of Decision
-        On the best member of every family at the end, rejected ones included.
+        Decisions on the best member of every family at the end, including rejected ones.
     first : Scene
-        At the base model's estimate, which the columns of all candidates were made at.
+        The scene at the base model's estimate, at which the columns of all candidates were computed.
     doubtful : tuple of Candidate
-        What those that stayed may stand for, see `Effect.doubtful`.
+        Candidates for which the kept effects may stand, see `Effect.doubtful`.
     passed : tuple of (str, SearchState)
-        The label of every effect that came in, in their order, and where the search stood before.
+        The label of every accepted effect, in their order, and the state of the search before.
     notes : tuple of str
-        What of the catalogue could not be tried.
+        Effects of the catalogue that could not be tried.
     """
 
     step: SelectionStep
@@ -89,7 +89,7 @@ class Search:
 
     @property
     def tried(self) -> int:
-        """Candidates and scan points tried."""
+        """Number of candidates and scan points tried."""
         return self.step.tried
 
     @property
@@ -113,19 +113,19 @@ class Search:
         return model_with(self.scene, self.chosen)
 
     def without(self, labels: Collection[str]) -> Search:
-        """Return it without some of the effects that stayed, the others fitted again."""
+        """Return the search without some of the kept effects, the others fitted again."""
         kept = tuple(item for item in self.chosen if item.label(self.scene) not in labels)
         steps = tuple(item for item in self.steps if item.decision.label not in labels)
         return replace(self, step=tune(replace(self.step, chosen=kept)), steps=steps)
 
     def beside(self, offsets: RunVariation | None) -> Search:
-        """Return it with the nonlinear parameters fitted beside offsets of runs, see `Estimate.offsets`."""
+        """Return the search with the nonlinear parameters fitted together with offsets of runs, see `Estimate.offsets`."""
         return replace(self, step=tune(replace(self.step, variation=offsets)))
 
     def whole(self, step: SelectionStep) -> SelectionStep:
-        """Return a step of the effects that stayed, with what was taken out of the data as the last of them.
+        """Return a step of the kept effects, with the correction of the data as the last of them.
 
-        Of that nothing is left to find, but how sure it is follows.
+        Nothing is left of the correction, but its uncertainty is included.
         """
         if self.correction is None:
             return step
@@ -134,7 +134,7 @@ class Search:
 
 @dataclass(frozen=True, eq=False)
 class SearchTask:
-    """What is to be searched.
+    """The task of a search.
 
     Attributes
     ----------
@@ -146,7 +146,7 @@ class SearchTask:
     progress : Work
         Called with every step that begins.
     asked_for : bool
-        Whether somebody chose the families, so that one that cannot be tried is an error and no note.
+        Whether the user chose the families; one that cannot be tried is then an error and not a note.
     """
 
     model: TorqueModel
@@ -165,18 +165,19 @@ def search(task: SearchTask, columns: CandidateColumns, *, known: Search | None 
     columns : CandidateColumns
         On the rows of the base model.
     known : Search, optional
-        An earlier one in other bands, where fits may begin.
+        An earlier search in other bands, which gives starting points for fits.
 
     Raises
     ------
     ScaraIdentError
-        If no member of a family that was asked for has finite columns on a joint.
+        If no member of a requested family has finite columns on a joint.
     """
     observations = columns.observations
     start = wls(observations)
     scene = scene_of(task.model, start.value, observations)
     differ = start.variation is not None and start.variation.delays is not None
-    # What each recording has of its own is a column for each: none is made where no joint shows that they differ.
+    # Effects of each recording need a column for each recording: they are not made if no joint shows that the
+    # recordings differ.
     families = [effect for effect in task.catalogue if differ or not effect.of_each_recording]
     everything = [Candidate(effect, member) for effect in families for member in effect.members(scene)]
     pool = tuple(dict.fromkeys([*everything, *([] if known is None else _beginnings(known))]))
@@ -195,16 +196,16 @@ def search(task: SearchTask, columns: CandidateColumns, *, known: Search | None 
 def search_again(
     task: SearchTask, found: Search, without: Collection[str], instead: Sequence[tuple[Candidate, Candidate]] = ()
 ) -> Search:
-    """Find what the model lacks without some effects, from where the first of them came in.
+    """Find what the model lacks without some effects, starting from the state before the first of them was accepted.
 
     Parameters
     ----------
     found : Search
         That found them.
     without : collection of str
-        Labels of what is not to be tried.
+        Labels of effects that must not be tried.
     instead : sequence of (Candidate, Candidate), optional
-        What is not to be tried, and in its place, see `in_place_of`.
+        Pairs of an effect that must not be tried and its replacement, see `in_place_of`.
     """
     gone = {*without, *(old.label(found.scene) for old, _ in instead if old in found.chosen)}
     place = next((k for k, (label, _) in enumerate(found.passed) if label in gone), 0)
@@ -216,7 +217,7 @@ def search_again(
 
 @dataclass(frozen=True, eq=False)
 class _Base:
-    """What a search begins from: the base model fitted, its rows, the scene that all columns are made at, and what is not tried."""
+    """The start of a search: the fitted base model, its rows, the scene at which all columns are computed, and what is not tried."""
 
     start: Estimate
     uncorrected: Observations
@@ -225,17 +226,17 @@ class _Base:
 
 
 def _beginnings(known: Search) -> list[Candidate]:
-    """Return what an earlier search found: it may lie between the points that are tried, and show itself at none of them."""
+    """Return what an earlier search found: it may be between the grid points and not visible at any of them."""
     return [item for item in known.chosen if not item.effect.fitted_first]
 
 
 def _searched(
     task: SearchTask, base: _Base, state: SearchState, known: Search | None, without: frozenset[str], passed: Passed
 ) -> Search:
-    """Let in one effect after another until none is left that helps."""
+    """Accept one effect after another until no further one helps."""
     criteria, near = task.criteria, None if known is None else known.step
     most = criteria.max_effects * (base.first.robot.n + 1)
-    # The fit that a step keeps goes with it: who asked for the search holds another.
+    # The fit in a step is released with it; the caller holds another step.
     state = replace(state, step=replace(state.step))
     while True:
         step, scene, chosen = state.step, state.step.scene, state.step.chosen
@@ -253,7 +254,7 @@ def _searched(
         if len(state.steps) < most:
             winner, refused, scene = choose(step, decisions, near)
             if winner is None and chosen != state.asked:
-                # What came in may have hidden when something acts.
+                # The accepted effect may have hidden the times at which something acts.
                 more = [item for item in _in_intervals(task.catalogue, state) if item.label(scene) not in taken]
                 state = replace(state.with_more(more), asked=chosen)
                 step = state.step
@@ -261,13 +262,13 @@ def _searched(
                 winner, unsound, scene = choose(step, found, near)
                 decisions, refused = decisions + found, refused | unsound
         else:
-            # What would come in next is not believed, and not forgotten.
+            # The next acceptable effect is not believed, but kept in the result.
             full = f"it passed its tests, but {most} effects are in the model already and no more are believed at once"
             refused = {label: item.refused(full) for label, item in best_of_each(decisions).items() if item.accepted}
         decisions = [item for item in decisions if item.label not in refused] + list(refused.values())
         gone = None
         if winner is None:
-            # Each explains more than what it replaces, or as much with fewer: there is an end, and this is one in any case.
+            # Each exchange explains more, or as much with fewer effects, so the loop ends; this is a limit in any case.
             free = state.exchanges < len(state.steps)
             swap = best_exchange(step, state.pool, base.first, (*without, *refused)) if free else None
             if swap is None:
@@ -276,7 +277,7 @@ def _searched(
         passed = (*passed, (winner.label, state.to_go_back_to(winner)))
         state = (state if gone is None else state.giving_way(gone)).at(scene).with_effect(winner)
     if state.correction is not None:
-        # What came in since had moved it.
+        # Effects accepted since then had changed it.
         state = state.corrected(state.correction.candidate)
     step = refined(tune(replace(state.step, chosen=needed(state.step))))
     labels = {item.label(step.scene) for item in step.chosen}
@@ -300,7 +301,7 @@ def _searched(
 def in_place_of(
     catalogue: Sequence[Effect], refused: Sequence[Decision], scene: Scene
 ) -> list[tuple[Candidate, Candidate]]:
-    """Return effects that are not believed, each with one that is tried in its place, see `Effect.in_place_of`."""
+    """Return effects that are not believed, each with its replacement, see `Effect.in_place_of`."""
     found = []
     for item in refused:
         old, value = item.candidate, item.examination.value
@@ -310,7 +311,7 @@ def in_place_of(
 
 
 def _in_intervals(catalogue: Sequence[Effect], state: SearchState) -> list[Candidate]:
-    """Return effects that act in intervals of recordings, as they are seen with those found taken off the torque."""
+    """Return effects that act in intervals of recordings, as seen with the effects found subtracted from the torque."""
     families = [effect for effect in catalogue if effect.in_intervals]
     step, value = state.step, state.value
     if not families or any(item.effect.in_intervals for item in step.chosen):
@@ -329,7 +330,7 @@ def _in_intervals(catalogue: Sequence[Effect], state: SearchState) -> list[Candi
 
 
 def scene_of(model: TorqueModel, value: Array, observations: Observations) -> Scene:
-    """Return how far recordings reach, and what the base model says of them."""
+    """Return the scene: the ranges of the recordings and the predictions of the base model."""
     data = observations.data
     travel, speed = np.zeros(model.robot.n), np.zeros(model.robot.n)
     longest = 0.0
@@ -340,7 +341,7 @@ def scene_of(model: TorqueModel, value: Array, observations: Observations) -> Sc
         longest = max(longest, float(time[-1] - time[0]))
         travel = np.maximum(travel, np.ptp(item.recording.position, axis=1))
     for part in data.stretches:
-        # What a servo trembles by that holds its joint is no motion of it.
+        # The vibration of a servo that holds its joint does not count as motion.
         speed = np.maximum(speed, np.where(part.stretch.idle, 0.0, np.max(np.abs(part.motion.v), axis=1)))
     travel[speed == 0.0] = 0.0
     slowest = float(min(part.rate for part in data.stretches))

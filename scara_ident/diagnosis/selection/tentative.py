@@ -15,9 +15,10 @@ from scara_ident.diagnosis.testing.selection_step import best_of_each
 from scara_ident.motion.position_noise import MIN_TRAVEL_SHARE, noise_sizes
 from scara_ident.robot.robot import Robot
 
-# Of more than this many, the most gaining first, nobody reads the rest; nothing is decided by it.
+# Number of tentative effects in the result, those with the largest gain first; no decision depends on it.
 MAX_TENTATIVE = 6
-# What settles an effect that noise may make, where motion is no remedy: the one that shows it best shows as much of that.
+# Settles an effect that noise may cause, if another motion does not help: a motion that shows the effect better shows
+# the noise as well.
 LESS_NOISE = "record positions with less noise: no rounding, time stamps with all digits"
 
 
@@ -32,7 +33,7 @@ class TentativeEffect:
     settled_by : str
         What to record.
     gain : float
-        Share of the squared residual of its joints that it would remove on data that it was not fitted to.
+        Share of the squared residual of its joints that it would remove in cross-validation.
     p_value : float
         Corrected for the candidates tried.
     decision : Decision or None
@@ -52,7 +53,7 @@ class TentativeEffect:
 def tentative_effects(
     found: Search, demoted: Sequence[Decision], believed: Collection[tuple[str, str | None]]
 ) -> tuple[TentativeEffect, ...]:
-    """Return the effects that an arm could have and that these recordings do not settle, the most gaining first.
+    """Return the effects that an arm could have and that these recordings do not settle, the largest gain first.
 
     Parameters
     ----------
@@ -79,7 +80,7 @@ def tentative_effects(
 
 
 def settled_by(found: Search, decisions: Sequence[Decision]) -> str:
-    """Return what to record to settle an effect on some joints: less noise beside the motion where that makes it, else its experiment."""
+    """Return what to record to settle an effect on some joints: less noise relative to the motion if noise may cause it, else its experiment."""
     if not all(decision.why.startswith(BY_NOISE) for decision in decisions):
         return decisions[0].candidate.effect.experiment
     scene = found.scene

@@ -1,4 +1,4 @@
-"""Acceptance of an effect: every condition that it must meet, and in words the one that it fails."""
+"""Acceptance of an effect: the conditions that it must meet, and in words the one that it fails."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from scara_ident.effects.effect import DOUBT_STDS
 
 @dataclass(frozen=True)
 class Decision:
-    """Whether a candidate may come in, and why.
+    """Whether a candidate is accepted, and why.
 
     Attributes
     ----------
     why : str
         In words.
     gain : float
-        What it removes on rows that it was not fitted to, as a share of that and what it leaves on its joint; see `gains`.
+        Gain in cross-validation: what it removes, as a share of that and the rest on its joint; see `gains`.
     tentative : bool
-        Not accepted, but worth a look: an arm can have it, it helps as much as is asked, and these recordings are too few
-        or too alike to be sure.
+        Not accepted, but worth a look: an arm can have it and it has the required gain, but these recordings are too
+        few or too similar to be sure.
     as_no_arm : float
-        The gain, where it is significant and only the sign or the size is none that a real arm can have; 0 elsewhere. Something
-        that is no noise goes as this effect does.
+        The gain, if it is significant but its sign or size is impossible for a real arm; otherwise 0. Something that is
+        not noise has the same shape as this effect.
     """
 
     candidate: Candidate
@@ -41,7 +41,7 @@ class Decision:
     as_no_arm: float = 0.0
 
     def refused(self, why: str) -> Decision:
-        """Return it as one that may be looked at, and not believed."""
+        """Return it as tentative: worth a look, and not believed."""
         return replace(self, accepted=False, tentative=True, why=why)
 
 
@@ -67,7 +67,7 @@ def decide(
     sure = unseen is None and seldom is None and _insignificant(examination, tried, criteria) is None
     as_no_arm = max(gain, 0.0) if sure and of_no_arm is not None else 0.0
     if _wrong_sign(candidate, examination):
-        # The best that a real one can be is absent: nothing is removed, and nothing speaks for it.
+        # The best possible value is zero: it removes nothing, and there is no evidence for it.
         examination, gain = replace(examination, p_value=1.0), min(gain, 0.0)
     words = why or f"removes {gain:.1%} of the squared residual in cross-validation"
     tentative = why is not None and small is None and examination.p_value <= criteria.significant
@@ -75,7 +75,7 @@ def decide(
 
 
 def _wrong_sign(candidate: Candidate, examination: Examination) -> bool:
-    """Whether the only coefficient is, beyond doubt, on the side of zero where no real one can be."""
+    """Whether the only coefficient certainly has the impossible sign."""
     names, value = candidate.effect.coefficients, examination.value
     if len(names) != 1 or len(value) != 1 or not names[0].positive:
         return False
@@ -89,7 +89,7 @@ def _unseen(examination: Examination, criteria: SelectionCriteria) -> str | None
 
 
 def _faint(examination: Examination, gain: float, criteria: SelectionCriteria) -> str | None:
-    """Say so where the model's own small errors may make it; they do not make most of what is left lie along one column."""
+    """Return the reason if small errors of the model may cause it; such errors cannot explain most of the residual by one column."""
     if examination.outside >= criteria.min_outside or gain >= criteria.dominant:
         return None
     return (
@@ -99,7 +99,7 @@ def _faint(examination: Examination, gain: float, criteria: SelectionCriteria) -
 
 def _inadmissible(candidate: Candidate, examination: Examination, scene: Scene) -> str | None:
     std = np.sqrt(np.clip(np.diag(examination.covariance), 0.0, None))
-    # Judged beside the parameters that the model has once the candidate is in it.
+    # Judged with the parameters that the model has with the candidate.
     after = replace(scene, value=examination.model_value[: len(scene.value)])
     return candidate.effect.inadmissible(after, candidate.member, examination.value, std)
 
@@ -117,7 +117,7 @@ def hopeless(decision: Decision, scene: Scene, criteria: SelectionCriteria) -> s
 def _small(
     candidate: Candidate, examination: Examination, scene: Scene, gain: float, criteria: SelectionCriteria
 ) -> str | None:
-    # What is taken out of the recordings is taken out however small it is, and however little it removes where it is not.
+    # A correction of the recordings is made however small it is, and however little it removes if it is not negligible.
     small = candidate.effect.negligible(scene, candidate.member, examination.value)
     if small is not None and not candidate.corrects_data:
         return small
@@ -128,17 +128,17 @@ def _small(
         return least
     if small is None:
         return None
-    # Too small to speak of, it may still be more than the parameters' standard deviations say that these are off by.
+    # Even if it is very small, its bias of the parameters may exceed their standard deviations.
     settled = candidate.effect.settled(examination.value)
     return None if not settled and displacement(examination) > 1.0 else least
 
 
 def displacement(examination: Examination) -> float:
-    """Return the mean square by which parameters are off without a candidate, in the standard deviations that they then have.
+    """Return the mean squared bias of the parameters without a candidate, in units of their standard deviations.
 
-    Over as many independent combinations of them as there are parameters. The model takes up all but
-    `Examination.outside` of the squares of a column, and with rows as sure throughout, those inside are to the coefficient's
-    own certainty as inside is to outside. Below 1 what they are off by is within what they are said to be unsure by.
+    The mean is over as many independent combinations as there are parameters. The model absorbs all but
+    `Examination.outside` of the squares of a column; for rows of equal noise the squared bias is to the squared
+    significance of the coefficient as inside is to outside. Below 1 the bias is within the stated uncertainty.
     """
     tested, outside = examination.tested, examination.outside
     if outside <= 0.0 or not np.all(np.isfinite(examination.covariance)):
@@ -151,7 +151,7 @@ def _insignificant(examination: Examination, tried: int, criteria: SelectionCrit
     alone, corrected = examination.p_value, examination.p_value * tried
     if corrected <= criteria.family_error:
         return None
-    # Worth a look by its own p-value: corrected, that may be 1, and no reader would see why to look.
+    # It is worth a look by its own p-value; the corrected one may be 1 and would not explain that.
     if alone <= criteria.significant:
         asked = f"{criteria.family_error / tried:.1e} is required"
         return f"may be chance: p = {alone:.1e} by itself, but with {tried} candidates tried {asked}"
@@ -161,10 +161,11 @@ def _insignificant(examination: Examination, tried: int, criteria: SelectionCrit
 
 def _seldom(candidate: Candidate, examination: Examination, gain: float, criteria: SelectionCriteria) -> str | None:
     helps, voting = examination.votes
-    # What is taken out of the recordings is the mean of them, whatever they differ by: left in, others would stand for it.
+    # A correction of the recordings is their mean, even if they differ: if it were not made, other effects would stand
+    # for it.
     if not voting or candidate.corrects_data or helps >= criteria.min_votes * voting:
         return None
-    # Of few trajectories one may be where it hardly shows: all would be asked of three.
+    # With few trajectories one may hardly show the effect; with three of them the share would require all.
     if gain >= criteria.dominant and voting - helps == 1 and helps > 1:
         return None
     return f"in cross-validation it helps in only {helps} of {voting} trajectories"

@@ -1,4 +1,4 @@
-"""Tests of each candidate: significance under correlated residuals, and gain on folds that it was not fitted to."""
+"""Tests of each candidate: significance under correlated residuals, and gain in cross-validation."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from scara_ident.diagnosis.testing.fitted_model import FittedModel, Products, pr
 from scara_ident.threads import side_by_side
 
 T = TypeVar("T")
-# Columns whose products are made together: more of them take more memory than time.
+# Number of columns whose products are computed together: more would take more memory without saving time.
 _COLUMNS = 32
 # Directions of a few columns below this share of the largest are not solved for.
 _RANK = 1e-9
@@ -40,10 +40,10 @@ class Examination:
     outside : float
         Share of the candidate that the model does not span already.
     gain : float
-        Fall of the weighted sum of squares on the rows it was fitted to, as a share.
+        Relative reduction of the weighted sum of squares on the fitted rows.
     held_out : float
-        The same with its coefficients fitted to the other folds; the model's own parameters are fitted to all, so
-        that a fold which they cannot be fitted without does not speak against a candidate.
+        The same in cross-validation: its coefficients are fitted to the other folds. The model's own parameters are
+        fitted to all folds, so a fold that they need does not count against a candidate.
     fold_gains : tuple of float or None
         Per fold; None where the fold abstains.
     model_value : ndarray, shape (m,)
@@ -51,7 +51,7 @@ class Examination:
     left : ndarray, shape (blocks,)
         Weighted squared residual of every block with the candidate in the model.
     products : ndarray, shape (k, k)
-        Weighted products of what the model leaves of its columns.
+        Weighted products of the part of its columns outside the model.
     freedom : float
         Degrees of freedom of the covariance.
     """
@@ -79,7 +79,7 @@ class Examination:
 def examine(
     model: FittedModel, candidates: Sequence[Rows], criteria: SelectionCriteria = CRITERIA
 ) -> list[Examination]:
-    """Examine candidates beside a model.
+    """Test candidates with a model.
 
     Parameters
     ----------
@@ -122,16 +122,16 @@ def held_out_gains(
 def gains(
     model: FittedModel, candidates: Sequence[Rows], joints: Sequence[int | None], found: Sequence[Examination]
 ) -> list[float]:
-    """Return what each candidate removes on rows that it was not fitted to, as a share of that and what its joint keeps.
+    """Return the gain of each candidate in cross-validation: what it removes, as a share of that and the rest on its joint.
 
-    It is near the share of its joint's squared residual where it removes little, and never above 1, though what a candidate
-    removes on other joints, through its columns there and through the model's parameters, may be more than its joint has.
+    For a small gain it is about the share of its joint's squared residual. It is never above 1, although a candidate
+    may remove more on other joints, through its columns there and through the model's parameters, than its joint has.
 
     Parameters
     ----------
     candidates : sequence of mapping of int to ndarray, shape (k, N)
     joints : sequence of int or None
-        Whose each is; None counts all joints.
+        The joint of each; None counts all joints.
     found : sequence of Examination
         Of each candidate.
     """
@@ -141,7 +141,7 @@ def gains(
         own = [k for k, place in enumerate(joints) if place == joint]
         whole = total * np.array([found[k].gain for k in own])
         removed = total * result[own]
-        # What holding out costs counts as left.
+        # The cost of holding out counts as residual.
         left = _left(model, joint, [candidates[k] for k in own], [found[k] for k in own]) + whole - removed
         result[own] = removed / np.maximum(np.maximum(removed, 0.0) + left, np.finfo(float).tiny)
     return [float(gain) for gain in result]
@@ -180,7 +180,7 @@ def _in_groups(
 def _outside(found: Products, criteria: SelectionCriteria) -> tuple[Array, Array, Array]:
     """Return the share of each candidate outside the model, and the products and scores of what is no rounding."""
     left = np.diagonal(np.sum(found.columns, axis=1), axis1=1, axis2=2)
-    # What is left of a column that the model spans is rounding, and must not be scaled up.
+    # The rest of a column within the span of the model is rounding, and must not be scaled up.
     absorbed = left < criteria.absorbed * found.sizes
     outside = np.max(np.where(absorbed, 0.0, left) / np.maximum(found.sizes, np.finfo(float).tiny), axis=1)
     products = np.where((absorbed[:, :, None] | absorbed[:, None, :])[:, None], 0.0, found.columns)
@@ -265,7 +265,7 @@ def _scaled(product: Array) -> tuple[Array, Array]:
 
 def _normal(product: Array, aim: Array) -> Array:
     """Solve normal equations of a few columns, scaled: (..., k, k) and (..., k)."""
-    # What another fold leaves of a column that only one excites may be below zero by rounding.
+    # For a column that only one fold excites, the rest in other folds may be negative by rounding.
     product = np.where(np.eye(product.shape[-1], dtype=bool), np.maximum(product, 0.0), product)
     size, unit = _scaled(product)
     return np.asarray(np.einsum("...ij,...j->...i", np.linalg.pinv(unit, rcond=_RANK), aim / size) / size)

@@ -1,11 +1,11 @@
-"""Cluster-robust tests of coefficients that hold with few blocks and correlated residuals.
+"""Cluster-robust tests of coefficients that are valid with few blocks and correlated residuals.
 
-Each block of time is a cluster. What the coefficients would be without a block follows in closed form from small
-products (delete-one jackknife, in which all parameters of the model are fitted again), and the scatter of these gives
-the covariance. It is scaled to be unbiased where residuals are white, and its degrees of freedom are those of
-Satterthwaite, from the candidate's own column as the model leaves it: a column that lives in three blocks has about
-two, however many blocks there are (Bell and McCaffrey 2002; Pustejovsky and Tipton 2018; MacKinnon, Nielsen and Webb
-2023). Neighbouring blocks are weighted in by Bartlett's kernel (Newey and West 1987), which costs freedom too.
+Each block of time is a cluster. The coefficients without a block follow in closed form from small products (delete-one
+jackknife, in which all parameters of the model are fitted again), and their scatter gives the covariance. It is scaled
+to be unbiased for white residuals. Its degrees of freedom are those of Satterthwaite, from the part of the candidate's
+own column outside the model: a column that acts in three blocks has about two, however many blocks there are (Bell and McCaffrey 2002; Pustejovsky and Tipton 2018; MacKinnon, Nielsen and Webb
+2023). Neighbouring blocks are included with Bartlett's kernel (Newey and West 1987), which reduces the degrees of
+freedom too.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ from scara_ident.arrays import Array
 from scara_ident.diagnosis.testing.balance import BENDS, Weighted, power, shares_of, weighted
 from scara_ident.diagnosis.testing.fitted_model import FittedModel, Products
 
-# Share of a direction that the other blocks must hold, or it cannot be tested without this one.
+# Share of a direction that the other blocks must contain, otherwise it cannot be tested without this block.
 _MIN_REDUNDANCY = 1e-6
-# Fewer degrees of freedom than this after those of several coefficients, and one direction alone is asked too.
+# With fewer degrees of freedom than this for several coefficients, one direction alone is tested too.
 FEW_FREEDOM = 10.0
-# Blocks are weighted where one holds more than this share of a direction: more than all others together.
+# Blocks are weighted if one contains more than this share of a direction: more than all others together.
 MAX_BLOCK_SHARE = 0.5
-# Weights of blocks are chosen for a probability such as one candidate of some two hundred must have.
+# Weights of blocks are chosen for a probability as required of one candidate of about two hundred.
 TYPICAL_LEVEL = 1e-5
-# With fewer degrees of freedom no size is significant: it would take millions of standard errors.
+# With fewer degrees of freedom no size is significant: it would need millions of standard errors.
 MIN_FREEDOM = 0.1
 # Directions of a few columns below this share of the largest are not tested.
 _RANK = 1e-9
-# Squares of columns that are none: the inverse of less leaves the range of numbers.
+# Squares of columns below this count as zero: the inverse of less overflows.
 _MIN_SQUARE = 1e-200
 
 

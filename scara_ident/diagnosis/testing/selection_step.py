@@ -1,4 +1,4 @@
-"""One step of the selection: a fitted model, and candidates tried beside it."""
+"""One step of the selection: a fitted model, and candidates tested with it."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ LINE_ROUNDS = 4
 
 @dataclass(frozen=True, eq=False)
 class SelectionStep:
-    """The model that candidates are tried beside, and what judging needs.
+    """The model with which candidates are tested, and the data for the decisions.
 
     Attributes
     ----------
@@ -47,11 +47,12 @@ class SelectionStep:
     tried : int
         Candidates and scan points tried.
     variation : RunVariation or None
-        What runs differ by, where all rows are to weigh it as the noise it is: their offsets, or all of it.
+        Differences between runs that all rows treat as noise: their offsets, or all of them.
     rest : Candidate or None
-        What may be left in the data of what was taken out of them, and is no part of an arm, see `Correction.left`.
+        What may be left in the data after a correction and is not a property of the arm, see `Correction.left`.
     minima : tuple of tuple of Candidate
-        Effects that act together as their fit has them, and as others that began elsewhere; empty where none did. See
+        Effects that act together, as fitted, and as other fits from other starts have them; empty if there were no
+        other fits. See
         `scara_ident.diagnosis.checks.other_minima`.
     """
 
@@ -66,7 +67,7 @@ class SelectionStep:
     minima: tuple[tuple[Candidate, ...], ...] = ()
 
     def __post_init__(self) -> None:
-        """Let the scene know which members act together: others in the model make other columns."""
+        """Tell the scene which members act together, because the columns depend on them."""
         together = together_of(self.chosen)
         if together != self.scene.together:
             object.__setattr__(self, "scene", replace(self.scene, together=together))
@@ -83,7 +84,7 @@ class SelectionStep:
         return self.fitted(with_columns(self.observations, own), _parameters(self.observations, own))
 
     def fitted(self, joints: Sequence[JointRows], parameters: int) -> FittedModel:
-        """Return the model of some rows that so many parameters have columns on, fitted."""
+        """Return the fitted model of some rows with columns of so many parameters."""
         model = fitted_rows(self.observations, joints, parameters, self.weights, self.criteria.parts)
         if self.variation is None:
             return model
@@ -91,7 +92,7 @@ class SelectionStep:
 
     @cached_property
     def in_parts(self) -> FittedModel:
-        """The same model with parts of every recording as folds, for what each recording has of its own."""
+        """The same model with parts of every recording as folds, for effects of each recording."""
         owner = self.model.owner
         count = np.bincount(owner)[owner]
         place = np.arange(len(owner)) - np.searchsorted(owner, owner)
@@ -99,7 +100,7 @@ class SelectionStep:
 
     @property
     def offsets(self) -> RunVariation | None:
-        """Offsets of runs, which fits take for noise whatever else rows weigh so, see `Estimate.offsets`."""
+        """Offsets of runs, which fits always treat as noise, see `Estimate.offsets`."""
         return None if self.variation is None else self.variation.offsets
 
     @property
@@ -109,22 +110,22 @@ class SelectionStep:
 
     @cached_property
     def noisier(self) -> SelectionStep:
-        """The same step had the positions their noise once more on top."""
+        """The same step with the noise of the positions added once more."""
         twin = self.columns.noisier
         scene = replace(self.scene, columns=columns_at_hand(twin.observations))
         return replace(self, scene=scene, columns=twin, variation=offsets_on(twin.observations, self.offsets))
 
     def lean(self) -> None:
-        """Forget what only saves time, in the step and in its columns."""
+        """Release the caches of the step and of its columns."""
         self.__dict__.pop("noisier", None)
         self.columns.lean()
 
     def rows(self, scene: Scene, candidates: Sequence[Candidate]) -> list[Rows]:
-        """Return the columns of candidates as they are tried beside the model."""
+        """Return the columns of candidates as they are tested with the model."""
         found = self.columns.rows(scene, candidates)
         whole = [place for place, item in enumerate(candidates) if item.corrects_data and self.chosen]
         if whole:
-            # What is taken out of the data is taken out of what effects in the model do, too.
+            # A correction of the data also corrects the torque of effects in the model.
             value, start = self.model.root @ self.model.projected, self.observations.parameters
             value = np.concatenate([np.zeros(start), value[start:]])
             torques = self.columns.predicted(self.scene, self.chosen, value)
@@ -136,7 +137,7 @@ class SelectionStep:
         return [{joint: self.variation.whitened(joint, own) for joint, own in rows.items()} for rows in found]
 
     def rows_at_hand(self, first: Scene, candidates: Sequence[Candidate]) -> list[Rows]:
-        """Return the columns that candidates have at another scene, or at this one where effects found make others of them."""
+        """Return the columns of candidates at another scene, or at this one if effects found change them."""
         acting = {j for item in self.scene.link_torques for j in item.effect.rows(self.scene, item.member)}
         loaded = [
             (item.effect.of_load and item.effect.geared_joint(item.member) in acting)
@@ -154,18 +155,18 @@ class SelectionStep:
     def judge(
         self, candidates: Sequence[Candidate], first: Scene | None = None, model: FittedModel | None = None
     ) -> list[Decision]:
-        """Examine candidates beside the model, and decide on each.
+        """Test candidates with the model, and decide on each.
 
         Parameters
         ----------
         first : Scene, optional
-            By whose columns at hand they are judged; default: the step's.
+            The scene whose available columns are used; default: the step's.
         model : FittedModel, optional
             In the place of the step's; see `scara_ident.diagnosis.fitting.linearised.freed_model`.
         """
         own = [item for item in candidates if item.effect.of_each_recording]
         if own and model is None:
-            # The others first, since what they make of the model serves both; then all in their order.
+            # The others first, because their model is used for both; then all in their order.
             plain = [item for item in candidates if not item.effect.of_each_recording]
             others = iter(self.judge(plain, first, self.model))
             timed = iter(self.judge(own, first, self.in_parts))
@@ -196,7 +197,7 @@ class SelectionStep:
         return replace(self, chosen=(*self.chosen[:place], *self.chosen[place + 1 :]))
 
     def refine(self, leaders: Sequence[Decision]) -> list[Decision]:
-        """Refine the nonlinear parameters of several candidates on lines that narrow about the best point so far."""
+        """Refine the nonlinear parameters of several candidates by line searches that narrow about the best point so far."""
         current = list(leaders)
         for round_ in range(LINE_ROUNDS):
             variants = [
@@ -233,7 +234,7 @@ def filled_blocks(joints: Sequence[JointRows]) -> NDArray[np.intp]:
 
 
 def fitted_model(observations: Observations, chosen: Sequence[Rows], weights: Array, parts: int) -> FittedModel:
-    """Return the base model with further columns, to be tried beside; blocks without any row are left out."""
+    """Return the base model with further columns, for testing candidates; blocks without any row are left out."""
     joints = with_columns(observations, chosen)
     return fitted_rows(observations, joints, _parameters(observations, chosen), weights, parts)
 
@@ -245,7 +246,7 @@ def _parameters(observations: Observations, chosen: Sequence[Rows]) -> int:
 def fitted_rows(
     observations: Observations, joints: Sequence[JointRows], parameters: int, weights: Array, parts: int
 ) -> FittedModel:
-    """Return the model of some rows that so many parameters have columns on; blocks without any row are left out."""
+    """Return the model of some rows with columns of so many parameters; blocks without any row are left out."""
     filled = filled_blocks(joints)
     owner = observations.owner[filled]
     # No column of a row is lost: only empty blocks go.
@@ -274,7 +275,7 @@ def observed(step: SelectionStep) -> Observations:
 
 
 def observed_at_every_sample(step: SelectionStep) -> Observations:
-    """Return the rows of the base model with the chosen effects, and the columns that nothing filtered."""
+    """Return the rows of the base model with the chosen effects, and the unfiltered columns."""
     if not step.chosen:
         return step.observations
     added = step.columns.raw(step.scene, step.chosen)
@@ -284,7 +285,7 @@ def observed_at_every_sample(step: SelectionStep) -> Observations:
         for raw in recording:
             more = [item[place] for item in added]
             own = [[item[j] for item in more if j in item] for j in range(len(raw))]
-            # What no effect acts on is shared, as it is large.
+            # Rows on which no effect acts are shared, because they are large.
             found.append(
                 tuple(
                     np.concatenate([rows, *beside]) if beside else rows for rows, beside in zip(raw, own, strict=True)
@@ -318,9 +319,9 @@ def moments_of(data: PreparedData) -> NDArray[np.intp]:
 
 
 def folds_of(data: PreparedData, owner: NDArray[np.intp], filled: NDArray[np.intp], parts: int) -> NDArray[np.intp]:
-    """Return the fold of each block: its trajectory, or which of so many parts of the only one.
+    """Return the fold of each block: its trajectory, or its part of the only one.
 
-    Repetitions are parted alike: what one shows of a moment of the motion, the others only repeat.
+    Repetitions are divided in the same way, because they repeat the same moments of the motion.
 
     Parameters
     ----------
@@ -374,14 +375,14 @@ def _line(scene: Scene, candidate: Candidate, round_: int) -> list[Candidate]:
 def _spacing(scene: Scene, candidate: Candidate, k: int) -> float:
     """Distance to the next scan point of a nonlinear parameter of a joint, in its logarithm where it is scanned so.
 
-    A family that knows how far apart values must be to be told apart says so by ``resolution``.
+    A family gives the distance at which two values can be distinguished by ``resolution``.
     """
     parameter = candidate.effect.nonlinear[k]
     widths = candidate.effect.resolution(scene, candidate.member)
     if widths is not None:
         return widths[k] / candidate.member.nonlinear[k] if parameter.logarithmic else widths[k]
     own = candidate.member
-    # Joints scan other values, some of which are very near to each other.
+    # Joints scan different values, and some are very near to each other.
     others = (
         item for item in candidate.effect.members(scene) if (item.joint, item.partner) == (own.joint, own.partner)
     )
