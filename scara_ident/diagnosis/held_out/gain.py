@@ -22,6 +22,10 @@ from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.run_offsets import offsets_on
 from scara_ident.recording.recording import Recording
 
+# Times as likely as with an effect, by which what is held out speaks for none: fairly strong evidence (Royall 1997, Statistical
+# Evidence, ch. 1). Of an effect that is there as large as was found, normal errors show so little in 2 % of all cases at most.
+MIN_LIKELIHOOD_RATIO = 8.0
+
 
 @dataclass(frozen=True)
 class HeldOutGain:
@@ -61,13 +65,16 @@ class HeldOutGain:
         return HeldOutGain(entry["gain"], entry["size"], std, entry["joint"], entry["without"], entry["with"])
 
     def against(self, criteria: SelectionCriteria = CRITERIA) -> bool:
-        """Whether it surely does not show there as large as it was found, and removes so little that it stands for another.
+        """Whether the recordings held out speak against it: it stands for another effect, or none is likelier.
 
-        What is less than half of what its size promises is another's doing, as where effects stand for what repeats. That it is
-        surely smaller is not enough: laws are no more than near, and of an effect that is there 99.0 +- 0.3 % may show.
+        It stands for another where it is surely smaller than it was found and removes less than half of what its size promises.
+        That it is surely smaller is not enough: laws are no more than near, and of an effect that is there 99.0 +- 0.3 % may show.
+        None is likelier where the size seen is that much nearer to 0 than to 1 (`MIN_LIKELIHOOD_RATIO`), however unsure either is.
         """
         removed = 2.0 * self.size - 1.0
-        return removed < criteria.min_of_repeatable and 1.0 - self.size > criteria.min_final_size * self.std
+        smaller = removed < criteria.min_of_repeatable and 1.0 - self.size > criteria.min_final_size * self.std
+        # The logarithm of the ratio of normal likelihoods of sizes 0 and 1.
+        return smaller or 0.5 - self.size > np.log(MIN_LIKELIHOOD_RATIO) * self.std**2
 
     def borne_out(self, criteria: SelectionCriteria = CRITERIA) -> bool:
         """Whether it surely shows there, and makes the error smaller by what it should."""
