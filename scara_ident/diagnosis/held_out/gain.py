@@ -22,6 +22,11 @@ from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.run_offsets import offsets_on
 from scara_ident.recording.recording import Recording
 
+# Likelihood ratio of no effect to the effect as found, from which the held-out recordings contradict it: fairly strong
+# evidence (Royall 1997, Statistical Evidence, ch. 1). For a true effect of the size found, normal errors reach it in at
+# most 2 % of all cases.
+MIN_LIKELIHOOD_RATIO = 8.0
+
 
 @dataclass(frozen=True)
 class HeldOutGain:
@@ -61,13 +66,17 @@ class HeldOutGain:
         return HeldOutGain(entry["gain"], entry["size"], std, entry["joint"], entry["without"], entry["with"])
 
     def against(self, criteria: SelectionCriteria = CRITERIA) -> bool:
-        """Whether it surely does not show there as large as it was found, and removes so little that it stands for another.
+        """Whether the held-out recordings contradict it: it stands for another effect, or no effect is more likely.
 
-        What is less than half of what its size promises is another's doing, as where effects stand for what repeats. That it is
-        surely smaller is not enough: laws are no more than near, and of an effect that is there 99.0 +- 0.3 % may show.
+        It stands for another if it is certainly smaller than it was found and removes less than half of what its size
+        predicts. To be certainly smaller is not enough: laws are only approximations, and of a true effect 99.0 +- 0.3
+        % may show. No effect is more likely if the size seen is so much nearer to 0 than to 1 (`MIN_LIKELIHOOD_RATIO`),
+        with its uncertainty.
         """
         removed = 2.0 * self.size - 1.0
-        return removed < criteria.min_of_repeatable and 1.0 - self.size > criteria.min_final_size * self.std
+        smaller = removed < criteria.min_of_repeatable and 1.0 - self.size > criteria.min_final_size * self.std
+        # The logarithm of the ratio of normal likelihoods of sizes 0 and 1.
+        return smaller or 0.5 - self.size > np.log(MIN_LIKELIHOOD_RATIO) * self.std**2
 
     def borne_out(self, criteria: SelectionCriteria = CRITERIA) -> bool:
         """Whether it surely shows there, and makes the error smaller by what it should."""

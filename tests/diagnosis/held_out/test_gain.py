@@ -8,12 +8,20 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from scara_ident.arrays import Array
 from scara_ident.diagnosis import Diagnosis, diagnose
 from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.evidence.evidence import Evidence
-from scara_ident.diagnosis.held_out.gain import HeldOutGain, held_out_gains, shown_of, spoken_against, words_of
+from scara_ident.diagnosis.held_out.gain import (
+    MIN_LIKELIHOOD_RATIO,
+    HeldOutGain,
+    held_out_gains,
+    shown_of,
+    spoken_against,
+    words_of,
+)
 from scara_ident.diagnosis.testing.selection_step import observed
 from scara_ident.effects.friction import PositionDependentFriction
 from scara_ident.effects.measurement import TimeDelay
@@ -237,7 +245,7 @@ def test_without_recordings_held_out_nothing_is_said():
 def test_what_was_shown_is_taken_back_on_the_joint_that_is_worse_and_only_there():
     shown = tuple(Evidence(joint, True, "whiteness", "white", 0.05) for joint in ("joint1", "joint2"))
     worse = HeldOutGain(-0.2, 0.1, 0.1, "joint2", 0.1, 0.15)
-    unsure = HeldOutGain(-0.2, 0.1, 0.35, "joint1", 0.1, 0.15)
+    unsure = HeldOutGain(-0.2, 0.1, 0.55, "joint1", 0.1, 0.15)
     one, other = spoken_against(shown, {"spring of joint1": worse, "base_tilt": unsure})
     assert one == shown[0]
     assert (other.shown, other.by) == (False, "")
@@ -256,11 +264,28 @@ def test_what_was_shown_is_taken_back_on_the_joint_that_is_worse_and_only_there(
         (0.4, 0.1, False, True),
         (0.4, 0.25, False, False),
         (0.1, 0.1, False, True),
+        # Likelier by a factor of 26 that it is not there than that it is; by 7; and where little can be seen, by 1.4.
+        (0.1, 0.35, False, True),
+        (0.0, 0.51, False, False),
+        (-0.4, 1.6, False, False),
     ],
 )
 def test_what_is_sure_enough_is_said_and_nothing_else(size: float, std: float, borne_out: bool, against: bool):
     gain = HeldOutGain(0.0, size, std, "joint1", 0.1, 0.1)
     assert (gain.borne_out(), gain.against()) == (borne_out, against)
+
+
+def test_it_is_the_ratio_of_the_likelihoods_of_none_and_of_all_of_it():
+    for size, std in [(0.2, 0.3), (-0.3, 0.6), (0.35, 0.25), (0.0, 0.4)]:
+        ratio = norm.pdf(size, 0.0, std) / norm.pdf(size, 1.0, std)
+        assert HeldOutGain(0.0, size, std, "joint1", 0.1, 0.1).against() == (ratio > MIN_LIKELIHOOD_RATIO)
+
+
+def test_of_what_is_there_it_says_so_seldom():
+    power = np.linspace(0.5, 8.0, 200)
+    # Of sizes about 1 with a standard deviation of 1 / power, the share below the limit.
+    seldom = norm.cdf((0.5 - np.log(MIN_LIKELIHOOD_RATIO) / power**2 - 1.0) * power)
+    assert 0.015 < np.max(seldom) < 0.021
 
 
 def test_how_little_stands_for_another_is_as_of_what_repeats():
