@@ -74,7 +74,7 @@ def runs() -> list[Recording]:
 def found_in(runs: list[Recording]) -> Diagnosis:
     found = diagnose(ur5(), runs[:5], validation=runs[5:], catalogue=effects_named("payload_change"))
     (effect,) = found.effects
-    assert effect.description == "a payload in run_1, run_2, not in the others"
+    assert effect.description == "a payload in run_1, run_2 and not in the others"
     told = {"mass": 1.2, **{f"com_{axis}": x for axis, x in zip("xyz", POINT, strict=True)}}
     assert set(effect.parameters) == set(told)
     for name, true in told.items():

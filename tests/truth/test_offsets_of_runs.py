@@ -90,7 +90,7 @@ def test_a_payload_in_some_runs_is_found_beside_offsets_of_all(tmp_path: Path):
         runs.append(replace(run, effort=run.effort + 0.5 * rng.standard_normal((2, 1))))
     families = effects_named("payload_change", "spring", "base_tilt")
     (payload,) = diagnose(robot, runs, model="basic", bands=(8.0, 8.0), catalogue=families).effects
-    assert "m1_1, m3_1, m5_1, not in the others" in payload.description
+    assert "m1_1, m3_1, m5_1 and not in the others" in payload.description
     mass, first = payload.parameters["mass"], payload.parameters["mx"]
     assert abs(mass.value - 0.5) < 3.0 * mass.std < 0.15
     assert abs(first.value - 0.15) < 3.0 * first.std < 0.03

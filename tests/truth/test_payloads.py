@@ -38,7 +38,7 @@ def test_a_payload_is_found_by_torque_and_reported_in_recordings_held_out():
     found = diagnose(robot, runs[:5], validation=runs[5:], catalogue=catalogue)
     (effect,) = found.effects
     assert effect.effect == "payload_change"
-    assert effect.description == "a payload in run_1, run_2, not in the others"
+    assert effect.description == "a payload in run_1, run_2 and not in the others"
     assert effect.parameters["mass"].value == pytest.approx(PAYLOAD.mass, rel=0.03)
     moments = np.array([effect.parameters[name].value for name in ("mx", "my", "mz")])
     true = PAYLOAD.mass * np.asarray(PAYLOAD.lever)

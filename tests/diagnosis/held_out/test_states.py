@@ -43,7 +43,7 @@ def test_a_payload_is_recognised_by_the_first_part_and_errors_are_of_the_rest():
     held = prepare(runs(1.5, 0.0, first=10), BANDS)
     states = held_out_states(result, after, held)
     (now,) = states.chosen
-    assert now.effect.description(states.scene, now.member) == "a payload in r_1, r_3, r_10, not in the others"
+    assert now.effect.description(states.scene, now.member) == "a payload in r_1, r_3, r_10 and not in the others"
     # A gear transmits it in these recordings too.
     assert [item.member for item in result.scene.link_torques] == [effect.member]
     assert [item.member for item in states.scene.link_torques] == [now.member]
