@@ -282,7 +282,7 @@ def _taken(worker: Connection) -> tuple[bool, Any]:
 
 def _lost() -> ProcessEnded:
     return ProcessEnded(
-        "a process of this run was ended from outside, as where memory runs out; give fewer recordings at a time, or shorter ones"
+        "a process of this run was ended from outside, for example because memory ran out; give fewer or shorter recordings at a time"
     )
 
 

@@ -376,7 +376,7 @@ def _at_rest(model: TorqueModel, limits: Limits, nominal: Array, q: Array) -> tu
             )
         if row < 2 * robot.n:
             name = robot.joints[row - robot.n]
-            return f"{name} stands at the end of its range; start away from it"
+            return f"{name} is at the end of its range; start away from it"
         if row >= 2 * robot.n + bool(np.isfinite(limits.floor)) and limits.clearance is not None:
             return f"{limits.clearance.nearest_of(q[:, index])}; ask for less clearance, or move what is in the way"
         return (

@@ -171,7 +171,7 @@ def share(composite: Array, members: Sequence[Member]) -> tuple[tuple[Array, ...
         return (remainder, *(member.parameters for member in members[1:])), None
     names = ", ".join(member.link for member in members[1:] if np.any(member.parameters))
     first = members[0].link
-    reason = f"{first}: beside the nominal {names} no possible link is left of the identified body"
+    reason = f"{first}: after subtracting the nominal {names} the rest of the identified body is no possible link"
     parts = _transport(composite, [member.in_joint_frame for member in members]) if possible else None
     if parts is None:
         alone = tuple(np.zeros(10) for _ in members[1:])

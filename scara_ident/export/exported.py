@@ -111,7 +111,7 @@ def exported_dict(found: IdentifiedModel, exported: Exported, source: str) -> di
 
 def said_lines(word: str, said: Said) -> list[str]:
     """Say what a form cannot say and what was fitted again for that; ``word`` is the form."""
-    lines = [f"{word}: cannot say {what}: {why}" for what, why in said.missing]
+    lines = [f"{word}: without {what}: {why}" for what, why in said.missing]
     again = f"{word}: fitted again to the same recordings: {', '.join(said.refitted)}"
     return [*lines, again] if said.refitted else lines
 
@@ -125,7 +125,7 @@ def about_lines(found: IdentifiedModel, said: Said) -> tuple[str, ...]:
         for j, name in enumerate(found.robot.joints)
     ]
     lines += [f"{note[0].upper()}{note[1:]}." for note in _open(found)]
-    return (*lines, *(f"Not said: {what}: {why}." for what, why in said.missing))
+    return (*lines, *(f"Not exported: {what}: {why}." for what, why in said.missing))
 
 
 def _open(found: IdentifiedModel) -> tuple[str, ...]:
@@ -137,7 +137,7 @@ def _undetermined(found: IdentifiedModel) -> tuple[str, ...]:
     names = [name for name, missing in zip(found.model.names, found.undetermined, strict=True) if missing]
     if not names:
         return ()
-    return (f"the recordings leave {listed(names, 12)} undetermined: torques that rest on them are not known",)
+    return (f"the recordings do not determine {listed(names, 12)}: torques that depend on them are not known",)
 
 
 def _number(value: float | None) -> str:

@@ -20,9 +20,9 @@ from scara_ident.export.identified_model import IdentifiedModel
 from scara_ident.export.traced_model import NOT_OF_STATE
 from scara_ident.model.terms import Friction, Offset, RigidBody, Term
 
-NO_PLACE = "the format has no place for it"
-AT_TIMES = "it was there at times; the arm is written as it is without it"
-NOT_READ = "programs that read it leave rotors out"
+NO_PLACE = "the format cannot hold it"
+AT_TIMES = "it was there only at times; the arm is written without it"
+NOT_READ = "programs that read it ignore rotors"
 # Torques of rigid bodies that differ by less, relative, are the same but for rounding.
 ROUNDING_SHARE = 1e-9
 
@@ -84,14 +84,16 @@ def possible_standard(found: IdentifiedModel) -> tuple[Array, tuple[str, ...]]:
     if found.standard is not None:
         return found.standard, ()
     if not any(item.rows for item in found.fitted):
-        raise EstimationError("the result holds no observations; no arm that can exist can be found for it")
+        raise EstimationError("the result contains no observations, so no physically consistent arm can be computed")
     # The bodies are what is wanted; friction is as the observations have it.
     problem = Problem(found.model, ConsistentOptions(friction="free"))
     information, notes = found.information, tuple[str, ...]()
     solution = least_squares_arm(problem, information)
     if solution is None:
         solution, information, _ = solve_joints(problem, found.fitted)
-        notes = ("no arm can have the identified parameters; this is the one that explains the same recordings best",)
+        notes = (
+            "the identified parameters are not physically consistent; this is the consistent arm that explains the same recordings best",
+        )
     x = nearest_arm(problem, information, solution.x)
     return problem.unknowns.standard(x), notes
 
@@ -203,7 +205,7 @@ def _missing_names(found: IdentifiedModel, missing: Sequence[tuple[Term, list[in
         if names:
             yield ", ".join(names), why
     for name in found.removed:
-        yield name, "it was taken out of the recordings"
+        yield name, "it was corrected in the recordings"
 
 
 def _adjustable(form: Form, found: IdentifiedModel) -> tuple[NDArray[np.intp], Array]:

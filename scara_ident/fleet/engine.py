@@ -100,7 +100,7 @@ class Engine:
 
 def _refuse(job: Job) -> None:
     """Tell work, and all that follows from it, that nobody does it."""
-    for more in job.then(ScaraIdentError("no worker is left; start workers and run again to go on")):
+    for more in job.then(ScaraIdentError("no worker is left; start workers and run again to continue")):
         _refuse(more)
 
 
@@ -252,7 +252,7 @@ def _outcome(future: Future[Any]) -> Any:
         return future.result()
     except KilledWorker:
         return ProcessEnded(
-            f"{MAX_DEATHS + 1} workers died on it, as on a file that is damaged or where memory runs out; `scara-ident identify` "
+            f"{MAX_DEATHS + 1} workers died on it, for example because a file is damaged or memory ran out; `scara-ident identify` "
             "on its recordings names such a file"
         )
     except Exception as error:

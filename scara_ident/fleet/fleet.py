@@ -119,8 +119,8 @@ class Fleet:
             return None
         steps = _steps(item.history for item in self.arms if item.history is not None)
         return (
-            f"{several(steps, 'difference')} between dates of the whole fleet cannot tell a change from what differs from day to "
-            f"day on any arm: it takes {FEWEST_STEPS}, of more dates or more arms"
+            f"{several(steps, 'difference')} between dates of the whole fleet are too few to distinguish a change from "
+            f"the normal differences from day to day: {FEWEST_STEPS} are needed, from more dates or more arms"
         )
 
     @property

@@ -31,7 +31,7 @@ def _sentence(changes: Sequence[Change], scene: Scene) -> str:
     if change.cause is None:
         std = np.sqrt(change.covariance[0, 0])
         share = _amount("", Parameter(float(change.size[0]), float(std), "1"))
-        return f"Residual of {change.joint}{share} since {day(change.since)}; no watched cause explains it"
+        return f"Residual of {change.joint}{share} since {day(change.since)}; no known cause explains it"
     cause = change.cause
     words = cause.words if cause.joint is None or cause.joint in cause.words else f"{cause.words} on {cause.joint}"
     each = ",".join(

@@ -34,7 +34,7 @@ CLOCKS = ("time", "__time", "timestamp", "t")
 STATED_CLOCKS = ("time", "receive_time")
 
 # What to do where a log has a file for every quantity.
-APART = "where they are in a file of their own, put the columns of both side by side in one"
+APART = "if they are in a separate file, put the columns of both side by side in one file"
 
 
 @dataclass
@@ -108,7 +108,7 @@ def guess(
         return result
     result.joints = [k for k in range(robot.n) if k in position.columns and (effort is None or k in effort.columns)]
     if effort is None:
-        result.notes.append(f"no efforts found: the file cannot be identified from; {APART}")
+        result.notes.append(f"no efforts found, so this file cannot be used to identify; {APART}")
     if not result.joints:
         result.problems.append("no joint has both a position and an effort")
         return result
@@ -127,7 +127,7 @@ def guess(
         if behind is not None:
             result.signals["link_position"] = behind
             own = ", ".join(robot.joints[k] for k in behind.columns)
-            said = f"link_position: {behind.pattern} taken for a second encoder behind the gear of {own}; check it"
+            said = f"link_position: {behind.pattern} taken as a second encoder behind the gear of {own}; check it"
             result.notes.append(said)
     return result
 
@@ -145,14 +145,14 @@ def _find_time(result: Guess, meanings: Mapping[str, Meaning], numbers: Mapping[
         if said is not None and said != seen:
             result.notes.append(f"{name!r} says {said}, and its steps look like {seen}: {seen} taken")
         if name in others:
-            result.notes.append(f"{name!r} is taken for the time because it grows evenly")
+            result.notes.append(f"{name!r} is taken as the time because it increases evenly")
         return
     for name in named:
         step = np.diff(numbers[name][np.isfinite(numbers[name])])
         if len(step) and np.all(step >= 0) and np.any(step > 0):
             still = float(np.mean(step == 0))
             result.problems.append(
-                f"{name!r} stands still in {still:.0%} of the rows: the clock is too coarse; record time with more digits"
+                f"{name!r} does not change in {still:.0%} of the rows: the clock is too coarse; record time with more digits"
             )
             return
     result.problems.append(
@@ -206,7 +206,7 @@ def _find_signal(
     if 0 < len(still) < len(best.columns):
         result.notes.append(f"{quantity}: constant for {', '.join(still)}; check its columns")
     if first[0]:
-        result.notes.append(f"{quantity}: {best.pattern} is by its name a command, not a measurement")
+        result.notes.append(f"{quantity}: {best.pattern} seems to be a command, not a measurement, by its name")
     return best
 
 
@@ -220,7 +220,7 @@ def _find_units(
     for k in result.joints:
         good &= np.isfinite(numbers[position.columns[k]])
     if np.count_nonzero(good) < 3:
-        result.problems.append("the positions are hardly ever numbers at one time")
+        result.problems.append("the positions are hardly ever numbers at the same time")
         return
     time = time[good]
     readings: dict[int, Reading] = {}
@@ -267,11 +267,11 @@ def _position_reading(
         agreeing = [reading for reading in fitting if reading.unit == named]
         if not agreeing:
             likely = f"; they fit {_spoken(fitting[0])}" if fitting else ""
-            result.notes.append(f"position: named {named}, which the limits in the URDF do not allow{likely}")
+            result.notes.append(f"position: named {named}, which does not agree with the limits in the URDF{likely}")
         return agreeing[0] if agreeing else Reading(named)
     if not fitting:
         result.problems.append(
-            f"the positions of the {kind} joints fit the URDF's limits in no unit: state theirs under position: unit"
+            f"the positions of the {kind} joints do not agree with the URDF's limits in any unit: state their unit under position: unit"
         )
         return Reading(next(iter(table_of("position", linear=bool(robot.prismatic[group[0]])))))
     if fitting[0].unit == COUNT:
@@ -302,7 +302,7 @@ def _find_velocity_unit(
             # The audit says the factor, here and wherever the recording is read.
             reading = Reading(_si(robot, "velocity", group[0]))
         if reading is None:
-            result.notes.append("velocity: no slope of the positions in any unit; left out")
+            result.notes.append("velocity: not the derivative of the positions in any unit; left out")
             del result.signals["velocity"]
             return
         units |= dict.fromkeys(group, reading.unit)
@@ -330,9 +330,11 @@ def _find_effort_unit(result: Guess, meanings: Mapping[str, Meaning], robot: Rob
             units[k] = next(iter(table))
     if len(units) < len(result.joints):
         said_in = " or ".join(dict.fromkeys("N" if robot.prismatic[k] else "N m" for k in result.joints))
-        result.notes.append(f"effort: torque or current is not said; state effort_gain, {said_in} per recorded unit")
+        result.notes.append(
+            f"effort: not known whether torque or current; state effort_gain, {said_in} per recorded unit"
+        )
     elif any(unit in DRIVE for unit in units.values()):
-        result.notes.append("effort: no torque but what the drive reports; effort_gain is 1 until you state it")
+        result.notes.append("effort: not a torque but a value of the drive; effort_gain is 1 until you state it")
     result.signals["effort"] = _with(effort, units, "joint")
 
 

@@ -193,8 +193,8 @@ def _moving_alone(recording: Recording | None) -> list[str]:
     if not idle or not moving:
         return []
     return [
-        f"where no recording moves more than {listed(moving, MAX_NAMED)}, --joints '{'|'.join(moving)}' identifies "
-        f"{'it' if len(moving) == 1 else 'them'} alone, with the other joints locked where they stand here"
+        f"if no recording moves more than {listed(moving, MAX_NAMED)}, --joints '{'|'.join(moving)}' identifies "
+        f"{'it' if len(moving) == 1 else 'them'} alone, with the other joints locked at their positions here"
     ]
 
 

@@ -53,7 +53,7 @@ def scale_note(recording: Recording, robot: Robot) -> str | None:
     beside = ""
     if near and any(not 1.0 / USUAL < sizes[j] < USUAL for j in unusual):
         # A URDF is often right of the large links and has the small ones roughly.
-        beside, asked = f", and near 1 on {', '.join(near)}", f"{asked}, or are the masses there others"
+        beside, asked = f", and near 1 on {', '.join(near)}", f"{asked}, or do the masses there differ"
     if min(sizes.values()) > LIKE_A_GEAR:
         asked += ", or is it measured in front of a gear (effort_side: motor, reduction)"
     said = ", ".join(f"{scale:.2g} {robot.torque_unit(j)} on {robot.joints[j]}" for j, scale in unusual.items())

@@ -38,7 +38,7 @@ def description_text(guess: Guess, robot: Robot, described: Mapping[str, Any], u
     """
     lines = [
         f"# First description of {_line(robot.name)}, guessed by `scara-ident inspect` from {_line(recording.name)} and the URDF.",
-        "# Check every line; what is marked STATE the program cannot know.",
+        "# Check every line; the program cannot know the values marked STATE.",
         f"urdf: {_word(str(urdf))}",
         "",
         *_side(robot),
@@ -76,12 +76,12 @@ def mapping(guess: Guess, robot: Robot) -> dict[str, Any]:
 def _side(robot: Robot) -> list[str]:
     if all(robot.reduction == 1.0):
         return [
-            "# Side of the gear on which effort is measured, motor or joint. No gear is known, which makes them one;",
+            "# Side of the gear on which effort is measured, motor or joint. Without a known gear both are the same;",
             "# STATE the reductions below and the side if it is the motor's.",
             "effort_side: joint",
         ]
     return [
-        "# STATE on which side of the gear effort is measured: motor or joint. Take away the # of the right line.",
+        "# STATE on which side of the gear effort is measured: motor or joint. Remove the # of the right line.",
         "# effort_side: motor",
         "# effort_side: joint",
     ]
@@ -108,7 +108,7 @@ def _rotor_words(guess: Guess, robot: Robot) -> list[str]:
     return [
         "# STATE rotor_inertia, kg m^2 of the rotor with shaft, brake and wave generator, on the motor's side of the gear",
         f"# (with reduction 1: seen at the joint{slides}). Gear loss, elasticity and backlash depend on it. The numbers behind # are",
-        f"# orders of magnitude from the effort limits, good to a factor of {GUESS_FACTOR:g}: not stated, they are where the search begins.",
+        f"# guesses from the effort limits, good to a factor of {GUESS_FACTOR:g}: if not stated, the search starts from them.",
     ]
 
 
@@ -146,8 +146,8 @@ def _joints(guess: Guess, robot: Robot) -> list[str]:
 def _locked(guess: Guess) -> list[str]:
     places = ", ".join(f"{_word(name)}: {0.0 if at is None else round(at, 6)!r}" for name, at in guess.locked.items())
     open_ = any(at is None for at in guess.locked.values())
-    said = "# STATE where these stand, rad or m, where it is 0.0: the file has no channels for them."
-    return [said if open_ else "# Where these stood, rad or m, by the file.", f"locked: {{{places}}}"]
+    said = "# STATE the position of those with 0.0, rad or m: the file has no channels for them."
+    return [said if open_ else "# Positions of these, rad or m, from the file.", f"locked: {{{places}}}"]
 
 
 def _recording(described: Mapping[str, Any], *, has_clock: bool) -> list[str]:

@@ -190,7 +190,7 @@ def find_base_parameters(robot: Robot, *, rotor_inertia: bool = True, seed: int 
         absent += list(range(10 * n, p))
     absent = sorted(set(absent))
     if not any(k not in absent for k in order):
-        raise RobotError(f"{robot.urdf}: no inertial parameter enters the torque of {', '.join(robot.joints)}")
+        raise RobotError(f"{robot.urdf}: no inertial parameter appears in the torque of {', '.join(robot.joints)}")
 
     kept: list[int] = []
     basis = np.zeros((columns.shape[0], 0))

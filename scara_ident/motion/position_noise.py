@@ -98,11 +98,11 @@ def _too_coarse(found: Sequence[tuple[str, float, float | None, float, str]], *,
         return ""
     joints, (_, step, band, way, unit) = ", ".join(name for name, *_ in found), found[0]
     within = "without a low-pass" if band is None else f"in a band of {band:.3g} Hz"
-    indistinct = f"{within} rest and motion cannot be told apart"
+    indistinct = f"{within} rest and motion cannot be distinguished"
     if little:
         return (
-            f"positions of {joints} move by {way:.2g} {unit} in all, in steps of {step:.2g} {unit}, so little that {indistinct}; "
-            "move further and faster, or give a narrower band"
+            f"positions of {joints} move by {way:.2g} {unit} in all, in steps of {step:.2g} {unit}, so little that "
+            f"{indistinct}; move further and faster, or give a narrower band"
         )
     return (
         f"positions of {joints} go in steps of {step:.2g} {unit}, so coarse that {indistinct}; record with a finer encoder, "
@@ -135,12 +135,12 @@ def unresolved_joints(data: PreparedData) -> dict[int, str]:
             shaken += part.samples * bool(REST_NOISE * swing > speed > 0.0)
         if shaken > 0.5 * whole:
             found[joint] = (
-                "its positions swing too fast and far for the rate, so that rest and motion cannot be told apart: "
-                "find what shakes it, record faster or smoother motions"
+                "its positions oscillate too fast for the sample rate, so rest and motion cannot be distinguished: "
+                "find the cause of the vibration, or record faster or smoother motions"
             )
     return found | {
-        joint: f"the arm shakes: {shaking}, and friction and sampling make of that what looks like effects: "
-        "find what shakes it, and record smoother motions"
+        joint: f"the arm vibrates: {shaking}, and with friction and sampling this looks like effects: find the cause "
+        f"of the vibration, and record smoother motions"
         for joint, shaking in _shaken(data).items()
     }
 
@@ -159,7 +159,7 @@ def _shaken(data: PreparedData) -> dict[int, str]:
         both = sum(float(a @ b[1:-1]) for a, (_, b) in zip(with_it, sides[joint], strict=True))
         if abs(both) <= SWING_CORRELATION * np.sqrt(swings[joint] * sum(float(own @ own) for own in with_it)):
             continue
-        why = f"the torque of {names[joint]} swings more beyond {NOISE_CUT_RATIO * parts[0][0].rate:.3g} Hz than it changes below"
+        why = f"the torque of {names[joint]} oscillates more above {NOISE_CUT_RATIO * parts[0][0].rate:.3g} Hz than it changes below"
         for other in np.flatnonzero(changes < LEVER**2 * swings[joint]):
             found.setdefault(int(other), why)
     return found

@@ -84,13 +84,13 @@ def trajectories_of(stretches: Sequence[Stretch]) -> Trajectories:
         called = sorted({stretches[k].trajectory for k in groups[g]})
         if len(called) > 1:
             under = "" if called == names else f" under the names {_listed(called)}"
-            notes.append(f"{_listed(names)} have the same motion{under}: taken as repetitions")
+            notes.append(f"{_listed(names)} have the same motion{under}: they count as repetitions")
     for name in sorted({stretch.trajectory for stretch in stretches}):
         place = [k for k, stretch in enumerate(stretches) if stretch.trajectory == name]
         motions = len({labels[k] for k in place})
         if motions > 1:
             runs = _listed(sorted(stretches[k].name for k in place))
-            notes.append(f"{runs} are {motions} different motions, so not all of them repetitions of {name}")
+            notes.append(f"{runs} are {motions} different motions, so they are not all repetitions of {name}")
     return Trajectories(tuple(labels), tuple(notes))
 
 

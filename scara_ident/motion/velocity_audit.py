@@ -69,7 +69,9 @@ class VelocityAudit:
             return VelocityFault(f"{OTHER_UNIT}{degrees}", self.gain, ".4g")
         if abs(self.lag) * rate > LAG_SAMPLES:
             verb = "lags" if self.lag > 0 else "leads"
-            return VelocityFault(f"it {verb} the position by {{}} ms, as a filter does", abs(self.lag) * 1e3, ".2g")
+            return VelocityFault(
+                f"it {verb} the position by {{}} ms, like the output of a filter", abs(self.lag) * 1e3, ".2g"
+            )
         return None
 
     def verdict(self, rate: float) -> str | None:
@@ -92,7 +94,7 @@ def faults_in_words(faults: Sequence[VelocityFault], moving: int = 0) -> str:
     alike = max(sizes) - min(sizes) < GAIN_ERROR * min(sizes)
     if faults[0].words == OTHER_UNIT and moving and alike:
         where = " on every joint" if moving > 1 else ""
-        return f"{said}{where}: is the unit or rate of time another, or that of velocity?"
+        return f"{said}{where}: is the unit or rate of time wrong, or the unit of velocity?"
     return said
 
 

@@ -291,12 +291,12 @@ class OnlineIdentifier:
         if self._filter is None:
             if v is None or a is None:
                 raise UsageError(
-                    "online: velocity or acceleration is None, and there is no band in which positions tell them; give both, or a band"
+                    "online: velocity or acceleration is None, and without a band they cannot be computed from positions; give both, or a band"
                 )
             return [("position", q), ("velocity", v), ("acceleration", a), ("effort", effort)]
         for name, signal in (("velocity", v), ("acceleration", a)):
             if signal is not None:
-                raise UsageError(f"online: {name} is given beside a band, in which positions tell it; give None")
+                raise UsageError(f"online: {name} is given, but with a band it is computed from positions; give None")
         return [("position", q), ("effort", effort)]
 
     def _take(self, samples: Array) -> list[Alarm]:

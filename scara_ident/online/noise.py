@@ -160,6 +160,7 @@ def too_wide(of_positions: Array, whole: Array, rows: Array, band: float, joints
         f"{min(x, 1.0):.0%} on {joint}" for joint, x, sure in zip(joints, share, outweighs, strict=True) if sure
     )
     return (
-        f"in a band of {band:g} Hz the noise of positions makes {each} of what is left of the torque, so that rows are neither "
-        f"independent nor right about themselves and more alarms are raised than asked for; a band of {narrower:.2g} Hz would do"
+        f"in a band of {band:g} Hz the noise of positions makes {each} of the residual torque, so rows are not "
+        f"independent, their stated noise is wrong and there are more alarms than requested; use a band of "
+        f"{narrower:.2g} Hz"
     )

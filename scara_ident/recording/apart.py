@@ -89,7 +89,7 @@ def _each_apart(read: Callable[[Path], T], paths: Sequence[Path]) -> Iterator[Ca
             return found()
         except ProcessEnded:
             raise RecordingError(
-                f"{path}: what reads it crashes, as on a file that is damaged or too large for the memory; save it again"
+                f"{path}: reading it crashes, for example because the file is damaged or too large for the memory; save it again"
             ) from None
 
     # Polars in a process that is forked from one that used it waits for threads that are not there.

@@ -85,8 +85,8 @@ def moving_though_locked(robot: Robot, places: Mapping[str, Channel], columns: M
             continue
         said = (
             f"{name} is locked at {place:.3g} in the model, and its column {channel.column!r} goes from {values.min():.3g} to "
-            f"{values.max():.3g}: what it does acts on the others as torque that the model lacks; name it under joints: in "
-            "robot.yaml, or take recordings in which it stands"
+            f"{values.max():.3g}: its motion causes torques on the other joints that the model does not have; name it "
+            f"under joints: in robot.yaml, or use recordings in which it does not move"
         )
         found.append(Finding("moving_lock", said, len(values)))
     return found

@@ -88,7 +88,7 @@ def sparse_channel(columns: Mapping[str, Array], wanted: Sequence[str]) -> str |
     if not 0 < held[least] < MIN_SAMPLES <= most:
         return None
     return (
-        f"column {least!r} holds a number in {several(held[least], 'row')}, where others do in {most}; at least {MIN_SAMPLES} "
+        f"column {least!r} has a number in {several(held[least], 'row')}, others in {most}; at least {MIN_SAMPLES} "
         "are needed: log it at a fixed rate, and not only when it changes"
     )
 
@@ -141,7 +141,7 @@ def _findings(groups: int, clock: Sequence[str], resampled: Sequence[str], lost:
     if groups < 2:
         return ()
     if not resampled:
-        said = f"{groups} groups of channels stand in rows of their own with the same times: joined"
+        said = f"{groups} groups of channels are in separate rows with the same times: joined"
         return (Finding("joined", said, groups),)
     cut = f"; {several(lost, 'row')} in gaps of theirs left out" if lost else ""
     said = f"{listed(resampled, 3)} were sampled apart from {clock[0]}: interpolated onto its clock{cut}"

@@ -212,8 +212,10 @@ def _kept(long: LongFile, robot: Robot, *, need_effort: bool) -> Recording:
     said = once(chain.from_iterable(part.findings for part in parts))
     kept = int(starts[-1])
     if long.windows != (long.bounds,):
-        where = f"of its {long.samples} samples {kept} are looked at, in {len(parts)} windows spread over it"
-        said.append(Finding("long", f"too long to hold: {where}; identify estimates from all", long.samples - kept))
+        where = f"of its {long.samples} samples {kept} are used, in {len(parts)} windows spread over it"
+        said.append(
+            Finding("long", f"too long for the memory: {where}; identify uses all samples", long.samples - kept)
+        )
     said += [Finding("refused", f"{error}; that window is left out") for error in errors[:1]]
     return replace(
         parts[0],

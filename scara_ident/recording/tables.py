@@ -131,7 +131,7 @@ def read_frame(frame: Any, robot: Robot, *, name: str = "frame", need_effort: bo
     """
     check_robot(robot)
     if hasattr(frame, "collect"):
-        raise ArgumentError(f"frame: a {type(frame).__name__}, whose rows are not there yet; give its collect()")
+        raise ArgumentError(f"frame: a {type(frame).__name__}, whose rows are not computed yet; give its collect()")
     if not (hasattr(frame, "columns") and hasattr(frame, "__getitem__")):
         raise ArgumentError(f"frame: expected a data frame of polars or pandas; found {type(frame).__name__}")
     channels = robot.channels or contract_channels(robot.joints)
@@ -177,7 +177,7 @@ def _column(source: str, name: str, values: Any) -> Array:
     """Return a column in float64; points in time in s since the first."""
     array = np.asarray(values)
     if array.ndim != 1:
-        raise RecordingError(f"{source}: column {name!r} stands in it twice; rename one of them")
+        raise RecordingError(f"{source}: column {name!r} is in it twice; rename one of them")
     if array.dtype.kind == "M":
         array = array - array[~np.isnat(array)][:1]
     if array.dtype.kind == "m":

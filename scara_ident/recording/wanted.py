@@ -90,7 +90,7 @@ def optional_channels(
         elif signal in channels.declared:
             refuse_missing(path, names, absent, channels)
         elif len(absent) < len(wanted):
-            said = f"no {', '.join(absent)} beside the other joints' {signal}: the {signal} columns are not used"
+            said = f"no {', '.join(absent)}, but other joints have {signal}: the {signal} columns are not used"
             findings.append(Finding("missing_column", said, len(absent)))
     return found, findings
 

@@ -175,7 +175,7 @@ def _undecided(diagnosis: Diagnosis) -> str:
     more = "something else is missing too" if diagnosis.effects else "something is missing"
     if lacking:
         return f"Undecided: {more} on {' and '.join(lacking)}, but these recordings cannot show what it is."
-    return f"Undecided: these recordings cannot tell whether {more}."
+    return f"Undecided: these recordings cannot show whether {more}."
 
 
 def _not_shown(evidence: Sequence[Evidence]) -> list[str]:

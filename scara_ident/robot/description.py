@@ -282,7 +282,7 @@ def _refuse_twice(node: Any, path: Path, above: str = "") -> None:
         name = f"{above}{key.value}"
         if name in seen:
             line = key.start_mark.line + 1
-            raise RobotError(f"{path}, line {line}: {name}: stands here twice; keep one of them")
+            raise RobotError(f"{path}, line {line}: {name}: is here twice; keep one of them")
         seen.add(name)
         _refuse_twice(value, path, f"{name}.")
 

@@ -319,7 +319,7 @@ def _identified_joints(
         if gripper:
             more = f" and {len(gripper) - 4} more" if len(gripper) > 5 else ""
             shown = gripper[:4] if more else gripper
-            notes.append(f"{', '.join(shown)}{more}: coupled (mimic) and carry no other joint: locked")
+            notes.append(f"{', '.join(shown)}{more}: coupled (mimic) and carry no other joint: they are locked")
         if source.suffix.lower() != ".yaml" and source == embedded_urdf():
             names = ["joint1", "joint2"]
     else:

@@ -107,12 +107,14 @@ def _no_tree(tree: ElementTree.Element) -> str | None:
         above[ends[1]] = ends[0]
     twice = _repeated(children)
     if twice is not None:
-        return f"link {twice!r} is the child of two joints; a URDF has no loops, cut one"
+        return f"link {twice!r} is the child of two joints; a URDF has no loops, remove one"
     roots = [name for name in links if name not in children]
     if not roots:
         return "every link is the child of a joint; a URDF has no loops, and begins at a link that is no child"
     if len(roots) > 1:
-        return f"links {', '.join(map(repr, roots[:3]))} hang on no joint; only one, the base, may"
+        return (
+            f"links {', '.join(map(repr, roots[:3]))} have no joint to a parent; only one link, the base, may have none"
+        )
     reached = set(roots)
     for name in links:
         path: list[str] = []
@@ -120,7 +122,7 @@ def _no_tree(tree: ElementTree.Element) -> str | None:
             path.append(name)
             name = above[name]
         if name not in reached:
-            return f"link {name!r} hangs on itself; a URDF has no loops, cut one of its joints"
+            return f"link {name!r} is connected to itself; a URDF has no loops, remove one of its joints"
         reached.update(path)
     return None
 
@@ -155,7 +157,7 @@ def _impossible_bodies(tree: ElementTree.Element) -> str | None:
         rounding = max(ROUNDING * max(abs(given[key]) for key in INERTIA), NO_WIDTH**2 * given["mass"])
         for key in ("mass", "ixx", "iyy", "izz"):
             if given[key] < (0.0 if key == "mass" else -rounding):
-                return f"{owner}: {key} is {given[key]:g}, and nothing has less than 0; correct it"
+                return f"{owner}: {key} is {given[key]:g}, but it cannot be below 0; correct it"
         for key, value in given.items():
             if abs(value) > HEAVIEST:
                 unit = "kg" if key == "mass" else "kg m^2"

@@ -58,7 +58,7 @@ class ReferenceMotion:
                 raise RecordingError(f"{self.name}: {name} has a value that is not finite; give a complete motion")
             if np.any(np.abs(values) > MAX_MAGNITUDE):
                 raise RecordingError(
-                    f"{self.name}: {name} reaches {np.max(np.abs(values)):.3g}, which no arm does; give it in rad, m and s"
+                    f"{self.name}: {name} reaches {np.max(np.abs(values)):.3g}, which is impossible for an arm; give it in rad, m and s"
                 )
         # What is not finite has no differences.
         if len(self.time) < 2 or not np.all(np.abs(self.time) < HUGE) or not np.all(np.diff(self.time) > 0):

@@ -107,7 +107,7 @@ def true_motion(
     )  # fmt: skip
     if stops < 0:
         raise LostArm(
-            f"{what}: the arm got out of control at {(-1 - stops) / rate:.3f} s; in Python give it a slower controller, or substeps"
+            f"{what}: the arm became unstable at {(-1 - stops) / rate:.3f} s; in Python give it a slower controller, or more substeps"
         )
     order = arm.robot.order
 

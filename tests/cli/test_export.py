@@ -33,7 +33,7 @@ def test_the_file_and_what_it_costs(command, steps, result: Path, tmp_path: Path
         assert errors["model"][joint] == pytest.approx(known[joint]["rms"], rel=1e-9)
         assert errors["with_code"][joint] == pytest.approx(errors["model"][joint], rel=1e-6)
     assert content["missing"]["exported"][0]["what"] == "a21, a31, a22, a32"
-    assert "exported: cannot say a21, a31, a22, a32" in done.out
+    assert "exported: without a21, a31, a22, a32" in done.out
     assert max(len(line) for line in done.out.splitlines() if not line.startswith("written: ")) <= 80
 
 

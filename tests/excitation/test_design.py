@@ -233,7 +233,7 @@ def test_the_start_can_be_given():
 def test_a_start_outside_the_limits_is_said():
     with pytest.raises(InfeasibleLimits, match=r"start: joint2 = 2\.5 lies outside its range -2\.18166\.\.2\.18166"):
         design_excitation(COMPLETE, limits=limits_of(SCARA, share=1.0), start=np.array([0.0, 2.5]))
-    with pytest.raises(InfeasibleLimits, match="joint2 stands at the end of its range"):
+    with pytest.raises(InfeasibleLimits, match="joint2 is at the end of its range"):
         design_excitation(COMPLETE, limits=limits_of(SCARA, share=1.0), start=np.array([0.0, 2.18]))
     with pytest.raises(UsageError, match="expected 2 positions"):
         design_excitation(COMPLETE, start=np.zeros(3))

@@ -49,7 +49,7 @@ def test_what_the_recordings_leave_open_is_said_beside_and_in_the_file(models, t
     found = models["scara", False]
     open_ = np.array([name == "a02" for name in found.model.names])
     done = export_model(replace(found, undetermined=open_), to)
-    said = "recordings leave a02 undetermined: torques that rest on them are not known"
+    said = "recordings do not determine a02: torques that depend on them are not known"
     assert f"the {said}" in done.notes
     code = [text for name, text in done.files.items() if name.endswith((".h", ".py", ".yaml"))]
     assert all(f"The {said}." in text for text in code)

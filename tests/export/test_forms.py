@@ -70,7 +70,7 @@ def test_what_is_missing_is_named_with_why(tmp_path: Path):
     missing = dict(said_by(FORMS["c"], found).missing)
     assert missing == {
         "warm_up of joint2": "it does not follow from position, velocity and acceleration at the moment",
-        "time_delay": "it was taken out of the recordings",
+        "time_delay": "it was corrected in the recordings",
     }
     names = dict(said_by(FORMS["urdf"], found, found.standard).missing)
     assert {"armature", "a21, a31, a22, a32", "p_o1, p_o2", "spring of joint2"} < set(names)
@@ -91,7 +91,7 @@ def test_friction_does_not_stand_in_for_what_was_carried_at_times(tmp_path: Path
     carried = identified(arm, ("payload_change",), samples=60)
     said = said_by(FORMS["c"], carried)
     assert said.refitted == ()
-    assert said.missing == (("payload_change", "it was there at times; the arm is written as it is without it"),)
+    assert said.missing == (("payload_change", "it was there only at times; the arm is written without it"),)
     term = carried.model.terms[-1]
     np.testing.assert_array_equal(said.value[: carried.model.place(term).start], carried.value[:-1])
     assert said.value[-1] == 0.0
@@ -131,9 +131,9 @@ def test_an_arm_that_can_exist_is_found_from_the_factors_alone(tmp_path: Path):
     wrong[found.model.names.index("P_d4")] = -0.5
     fitted = tuple(_answering(item, wrong) for item in found.fitted)
     standard, notes = possible_standard(replace(found, value=wrong, fitted=fitted))
-    assert "no arm can have the identified parameters" in notes[0]
+    assert "the identified parameters are not physically consistent" in notes[0]
     assert np.all(np.linalg.eigvalsh(standard[14:20][[[0, 1, 3], [1, 2, 4], [3, 4, 5]]]) > -1e-9)
-    with pytest.raises(EstimationError, match="holds no observations"):
+    with pytest.raises(EstimationError, match="contains no observations"):
         possible_standard(replace(found, fitted=tuple(Information.empty(len(value)) for _ in range(2))))
 
 

@@ -46,7 +46,7 @@ def test_the_urdf_is_an_arm_with_the_identified_base_parameters(found: Identific
 def test_the_files_are_those_of_the_export_of_the_result_file(found: Identification, tmp_path: Path):
     files, notes = robot_files(identified_model(found))
     assert list(files) == ["scara03_identified.urdf", "scara03_identified.xml"]
-    assert "URDF: cannot say a21, a31, a22, a32: the format has no place for it" in notes
+    assert "URDF: without a21, a31, a22, a32: the format cannot hold it" in notes
     assert any(note.startswith("MJCF: fitted again to the same recordings: a01, a11") for note in notes)
     write_json(tmp_path / "identification.json", identification_dict(found))
     read = read_identified(tmp_path / "identification.json")

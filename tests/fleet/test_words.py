@@ -34,7 +34,7 @@ def test_a_change_is_said_with_size_uncertainty_and_date(histories):
     count = causes[inertia].sizes
     assert "masses and inertias" in of(inertia, [1.0] + [0.0] * (count - 1), [1e-2] * count).lower()
     unknown = of(coulomb, [2.0], [0.01], cause=None)
-    assert unknown == "Residual of joint2 up 200 % (± 10 %) since 1 March 2026; no watched cause explains it"
+    assert unknown == "Residual of joint2 up 200 % (± 10 %) since 1 March 2026; no known cause explains it"
 
 
 def test_two_changes_of_one_cause_are_one_sentence_by_their_dates(histories):

@@ -102,7 +102,7 @@ def test_what_is_held_does_not_grow_and_all_samples_count_though_few_are_kept(ru
     assert parts.training.samples == whole.training.samples
     # Of 30 longer blocks a standard deviation is known to about an eighth.
     assert parts.estimate.std == pytest.approx(whole.estimate.std, rel=0.6)
-    assert any("of its 15000 samples 4500 are looked at, in 3 windows" in note for note in parts.notes)
+    assert any("of its 15000 samples 4500 are used, in 3 windows" in note for note in parts.notes)
 
 
 def test_a_part_that_cannot_be_used_is_left_out_and_named(run, tmp_path, monkeypatch):

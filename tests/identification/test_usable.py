@@ -184,7 +184,7 @@ def test_velocities_that_lag_by_about_as_much_are_one_line(robot: Robot):
     # The last recording's first joint alone lags otherwise, but as a filter does.
     (said,) = velocity_notes(items)
     names = "run_1, run_2, run_3: recorded velocity of joint1, joint2 is not used: it lags the position by "
-    assert said == f"{names}6.4 to 7.2 ms, as a filter does"
+    assert said == f"{names}6.4 to 7.2 ms, like the output of a filter"
     # Another joint of its own is another line.
     assert items[0].velocity is not None
     alone = replace(items[0], velocity=np.array([items[0].velocity[0], np.gradient(items[0].position[1], 1.0 / RATE)]))

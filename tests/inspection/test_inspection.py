@@ -51,7 +51,7 @@ def test_a_clock_that_the_velocities_contradict_is_asked_about(tmp_path, slow: f
         f"urdf: {embedded_urdf()}\neffort_side: motor\njoints: {{joint1: {{}}, joint2: {{}}}}\n"
     )
     found = inspect_file(path, robot=tmp_path / "robot.yaml")
-    asked = [note for note in found.notes if "is the unit or rate of time another" in note]
+    asked = [note for note in found.notes if "is the unit or rate of time wrong" in note]
     assert len(asked) == (slow != 1.0)
 
 
@@ -65,8 +65,8 @@ def test_a_first_description_keeps_velocities_that_are_one_multiple_of_the_slope
         made[f"arm {joint}.velocity"] = factor * np.asarray(MADE[f"{joint}.velocity"])
     found = inspected(save(tmp_path / "a.parquet", made), tmp_path)
     assert ("velocity" in found.mapping) is (factors[0] == factors[1])
-    assert any("is the unit or rate of time another" in note for note in found.notes) is asked
-    assert any("no slope of the positions in any unit; left out" in note for note in found.notes) is (
+    assert any("is the unit or rate of time wrong" in note for note in found.notes) is asked
+    assert any("not the derivative of the positions in any unit; left out" in note for note in found.notes) is (
         factors[0] != factors[1]
     )
 

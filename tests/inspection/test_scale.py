@@ -60,7 +60,7 @@ def test_where_most_joints_agree_the_masses_are_doubted_as_well(tmp_path: Path):
     urdf = write_urdf(tmp_path / "arm.urdf", PLANAR_2R)
     (said,) = scale(inspect_file(recorded(urdf, tmp_path, (1.0, 0.2)), urdf=urdf).notes)
     assert said.endswith(
-        "roughly 0.2 N m on j2, and near 1 on j1: is effort_gain to be stated, or are the masses there others?"
+        "roughly 0.2 N m on j2, and near 1 on j1: is effort_gain to be stated, or do the masses there differ?"
     )
 
 

@@ -32,7 +32,7 @@ def inspected(tmp_path, made):
 def test_a_position_named_the_links_that_follows_the_motors_is_a_second_encoder(tmp_path):
     found = inspected(tmp_path, columns("se_pos_deg"))
     assert found.mapping["link_position"] == {"column": "se_pos_deg[{index}]", "unit": "deg"}
-    assert any("se_pos_deg[{index}] taken for a second encoder" in note for note in found.notes)
+    assert any("se_pos_deg[{index}] taken as a second encoder" in note for note in found.notes)
 
 
 def test_a_joint_whose_column_does_not_move_has_none_and_the_written_description_reads_so(tmp_path):

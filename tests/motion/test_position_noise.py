@@ -205,7 +205,7 @@ def test_where_one_joint_shakes_with_more_torque_than_it_moves_with_none_is_reso
     data = prepare([recording(load_robot(), "M_1", time, motion, torque)], (25.0, 25.0))
     found = unresolved_joints(data)
     assert set(found) == ({0, 1} if shaken else set())
-    assert not shaken or "the torque of joint1 swings more beyond 40 Hz" in found[1]
+    assert not shaken or "the torque of joint1 oscillates more above 40 Hz" in found[1]
 
 
 @pytest.mark.parametrize(("size", "shaken"), [(1.0, {0, 1}), (0.01, {0})])

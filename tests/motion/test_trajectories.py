@@ -45,7 +45,7 @@ def test_fourteen_names_for_seven_motions_twice_are_seven_trajectories():
     found = trajectories_of([run(k // 2, f"X_{k:02}", seed=k) for k in range(14)])
     assert found.labels == tuple(f"X_{2 * (k // 2):02}" for k in range(14))
     (note,) = found.notes
-    assert note == "X_00, X_01 ... X_13 are 7 different motions, so not all of them repetitions of X"
+    assert note == "X_00, X_01 ... X_13 are 7 different motions, so they are not all repetitions of X"
 
 
 def test_different_motions_of_one_name_are_no_repetitions():
@@ -57,10 +57,10 @@ def test_equal_motions_under_other_names_are_repetitions():
     found = trajectories_of([run(1, "morning"), run(2, "other"), run(1, "noon", seed=1), run(1, "noon_2", seed=2)])
     assert found.labels == ("noon", "other", "noon", "noon")
     assert found.notes == (
-        "morning, noon, noon_2 have the same motion under the names morning, noon: taken as repetitions",
+        "morning, noon, noon_2 have the same motion under the names morning, noon: they count as repetitions",
     )
     pieces = trajectories_of([run(1, "run_part"), run(1, "again_part", seed=1)])
-    assert pieces.notes == ("again_part, run_part have the same motion: taken as repetitions",)
+    assert pieces.notes == ("again_part, run_part have the same motion: they count as repetitions",)
 
 
 def test_an_odd_run_leaves_the_name_to_the_others():

@@ -99,7 +99,7 @@ def test_a_factor_that_all_joints_share_may_be_that_of_time(
     (names, remark), *_ = velocity_remarks([("a", RATE, found), ("b", RATE, found)])
     assert names == ["a", "b"]
     assert remark.startswith("recorded velocity of joint1")
-    assert remark.endswith("on every joint: is the unit or rate of time another, or that of velocity?") is asked
+    assert remark.endswith("on every joint: is the unit or rate of time wrong, or the unit of velocity?") is asked
 
 
 def test_where_one_joint_moves_its_factor_may_be_that_of_time(truthful: Recording):
@@ -107,7 +107,7 @@ def test_where_one_joint_moves_its_factor_may_be_that_of_time(truthful: Recordin
     found = audits(replace(truthful, velocity=3.0 * truthful.velocity))[:1]
     ((_, remark),) = velocity_remarks([("a", RATE, found)])
     assert remark.endswith(
-        "times the derivative of the position: is the unit or rate of time another, or that of velocity?"
+        "times the derivative of the position: is the unit or rate of time wrong, or the unit of velocity?"
     )
 
 

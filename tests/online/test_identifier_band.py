@@ -171,9 +171,9 @@ def test_at_rest_nothing_is_learnt_and_nothing_winds_up():
 def test_velocity_beside_a_band_and_none_without_are_refused():
     online = OnlineIdentifier(model(), NOISE, SETTINGS)
     q, zero = np.zeros((2, 5)), np.zeros((2, 5))
-    with pytest.raises(UsageError, match="velocity is given beside a band, in which positions tell it; give None"):
+    with pytest.raises(UsageError, match="velocity is given, but with a band it is computed from positions; give None"):
         online.update_block(q, zero, None, zero)
-    with pytest.raises(UsageError, match="acceleration is given beside a band"):
+    with pytest.raises(UsageError, match="acceleration is given, but with a band"):
         online.update(q[:, 0], None, zero[:, 0], zero[:, 0])
     with pytest.raises(UsageError, match=r"effort of shape \(3,\); expected \(2,\)"):
         online.update(q[:, 0], None, None, np.zeros(3))

@@ -103,10 +103,10 @@ def test_a_band_that_does_has_no_more_of_it_at_its_end_than_of_the_torques():
     assert too_wide(more, whole, 100.0 * rows, 10.0, joints) is not None
     said = too_wide(np.array([0.1, 3.0]), whole, rows, 10.0, joints)
     # It grows as the fourth power of the band: three times the torque's falls to a fifth.
-    assert said is not None and f"a band of {10.0 * (0.2 / 3.0) ** 0.25:.2g} Hz would do" in said
-    assert "makes 75% on b of what" in said
+    assert said is not None and f"use a band of {10.0 * (0.2 / 3.0) ** 0.25:.2g} Hz" in said
+    assert "makes 75% on b of the residual" in said
     # Where all is noise of positions the torque's is as it was given, and no larger than may still be there.
     for whole_of, torque in ((100.0, 1.0), (4.0, 0.2)):
         said = too_wide(np.array([1.2 * whole_of, 0.0]), np.array([whole_of, 1.0]), rows, 10.0, joints)
         assert said is not None and "makes 100% on a of what" in said
-        assert f"a band of {10.0 * (0.2 * torque / (1.2 * whole_of)) ** 0.25:.2g} Hz would do" in said
+        assert f"use a band of {10.0 * (0.2 * torque / (1.2 * whole_of)) ** 0.25:.2g} Hz" in said

@@ -95,7 +95,7 @@ def test_one_that_crashes_its_reader_is_left_out_and_named(tmp_path: Path, monke
     assert [name for name, _ in second] == ["OJK_1"]
     assert nothing == [] and third == ((), [])
     assert said == [
-        f"{paths[1]}: what reads it crashes, as on a file that is damaged or too large for the memory; save it again; left out",
+        f"{paths[1]}: reading it crashes, for example because the file is damaged or too large for the memory; save it again; left out",
         f"{paths[3]}: no numbers; record again; left out",
     ]
 
@@ -105,7 +105,7 @@ def test_one_that_crashes_its_reader_is_left_out_and_named(tmp_path: Path, monke
 def test_where_no_other_is_left_it_is_an_error(how: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     stand_in(monkeypatch, **{how: "OJD_2"})
     good, bad = files(tmp_path, "OJD_1", "OJD_2")
-    words = {"crash": "what reads it crashes", "refuse": "no numbers"}[how]
+    words = {"crash": "reading it crashes", "refuse": "no numbers"}[how]
     with usable_beside(ARM, [good], [bad]) as wanted, pytest.raises(RecordingError, match=rf"OJD_2\.csv: {words}"):
         wanted()
     with pytest.raises(RecordingError, match=words):
@@ -113,7 +113,7 @@ def test_where_no_other_is_left_it_is_an_error(how: str, tmp_path: Path, monkeyp
 
 
 def test_one_file_that_crashes_what_reads_it_is_named(tmp_path: Path) -> None:
-    with pytest.raises(RecordingError, match=r"OJD_2\.csv: what reads it crashes"):
+    with pytest.raises(RecordingError, match=r"OJD_2\.csv: reading it crashes"):
         read_apart(lambda path: os.kill(os.getpid(), signal.SIGKILL), tmp_path / "OJD_2.csv")
 
 
@@ -145,5 +145,5 @@ sys.exit(run({[*command.split(), str(tmp_path if command == "ask" else bad)]!r})
     )
     assert done.returncode == 1
     assert done.stdout == ""
-    assert done.stderr.startswith(f"scara-ident: {bad}: what reads it crashes")
+    assert done.stderr.startswith(f"scara-ident: {bad}: reading it crashes")
     assert done.stderr.count("\n") == 1

@@ -93,7 +93,7 @@ def test_a_command_that_is_logged_when_it_changes_is_named():
     made = interleaved(ARM, few)
     said = sparse_channel(made, ["a", "b", "c"])
     assert said is not None
-    assert said.startswith("column 'c' holds a number in 5 rows, where others do in 200; at least 50 are needed")
+    assert said.startswith("column 'c' has a number in 5 rows, others in 200; at least 50 are needed")
     assert sparse_channel(made, ["a", "b"]) is None
     # Too short a recording is one.
     short = {name: values[:30] for name, values in ARM.items()}

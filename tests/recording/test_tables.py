@@ -90,7 +90,7 @@ def test_what_arrays_lack_is_said(robot: Robot, arguments, error, said: str):
 
 
 def test_a_lazy_frame_is_to_be_collected(robot: Robot):
-    with pytest.raises(ArgumentError, match=r"a LazyFrame, whose rows are not there yet; give its collect\(\)"):
+    with pytest.raises(ArgumentError, match=r"a LazyFrame, whose rows are not computed yet; give its collect\(\)"):
         read_frame(pl.DataFrame(MADE).lazy(), robot)
 
 

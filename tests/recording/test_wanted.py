@@ -50,4 +50,4 @@ def test_what_is_to_be_run_names_the_file_where_it_is_and_no_column_of_another_j
 def test_a_signal_of_some_joints_only_is_left_out_and_said():
     found, (said,) = optional_channels(Path("a.csv"), CHANNELS, ["j1.velocity"], ())
     assert found == {}
-    assert "no j2.velocity beside" in said.message
+    assert "no j2.velocity, but other joints" in said.message

@@ -81,7 +81,7 @@ def test_where_it_cannot_be_determined_the_first_sentence_says_so_then_what_to_d
     unsure = replace(result.evidence[0], shown=False, by="", why="it is not white")
     undecided = replace(result, verdict="undecided", evidence=(unsure, result.evidence[1]), effects=())
     first, second, third, *_ = sentences(undecided)
-    assert first == "Undecided: these recordings cannot tell whether something is missing."
+    assert first == "Undecided: these recordings cannot show whether something is missing."
     assert second == f"To do first: {next_steps(undecided)[0].within()}"
     assert third == "On joint1: it is not white."
     both = (
@@ -97,7 +97,7 @@ def test_where_it_cannot_be_determined_the_first_sentence_says_so_then_what_to_d
     )
     assert diagnosis_dict(lacking)["evidence"]["joint1"]["lacks"] is True
     found, *_ = sentences(replace(undecided, effects=result.effects))
-    assert found == "Undecided: these recordings cannot tell whether something else is missing too."
+    assert found == "Undecided: these recordings cannot show whether something else is missing too."
 
 
 def test_a_model_to_try_is_reported_where_a_straight_friction_law_leaves_a_curve():

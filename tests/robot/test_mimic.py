@@ -29,7 +29,7 @@ def test_a_gripper_is_locked_where_its_master_stands(tmp_path: Path):
     robot = load_robot(coupled(tmp_path, (4, 'joint="j3" multiplier="-2" offset="0.1"'), joints="locked: {j3: 0.2}\n"))
     assert robot.joints == ("j1", "j2")
     assert dict(robot.locked) == {"j3": 0.2, "j4": pytest.approx(-0.3)}
-    assert robot.notes == ("j3, j4: coupled (mimic) and carry no other joint: locked",)
+    assert robot.notes == ("j3, j4: coupled (mimic) and carry no other joint: they are locked",)
 
 
 def test_a_chain_of_followers_follows_its_first(tmp_path: Path):

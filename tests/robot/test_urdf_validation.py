@@ -48,7 +48,7 @@ def test_a_tree_cut_in_two_is_reported(tree, data: st.DataObject):
     lost = data.draw(st.sampled_from(joints))
     fault = urdf_fault(robot(links, [joint for joint in joints if joint != lost]))
     assert fault is not None
-    assert fault.endswith("hang on no joint; only one, the base, may")
+    assert fault.endswith("have no joint to a parent; only one link, the base, may have none")
     assert repr(lost[2]) in fault
 
 
@@ -62,7 +62,7 @@ def test_a_tree_cut_in_two_is_reported(tree, data: st.DataObject):
         (["a", "b", "c"], [("j", "a", "c"), ("k", "b", "c")], "link 'c' is the child of two joints"),
         (["a", "b"], [("j", "a", "b"), ("k", "b", "a")], "every link is the child of a joint"),
         (["a", "b"], [("j", "b", "b")], "joint 'j': link 'b' is its parent and its child; a URDF has no loops"),
-        (["a", "b", "c"], [("j", "b", "c"), ("k", "c", "b")], "link 'b' hangs on itself; a URDF has no loops"),
+        (["a", "b", "c"], [("j", "b", "c"), ("k", "c", "b")], "link 'b' is connected to itself; a URDF has no loops"),
         (["a", "b"], [("", "a", "b")], "a joint has no name"),
         (["a", ""], [("j", "a", "")], "a link has no name"),
     ],
@@ -104,7 +104,7 @@ def test_a_right_robot_has_no_fault_and_neither_have_those_of_makers():
     point = '<inertia ixx="{0}" ixy="0" ixz="0" iyy="{0}" iyz="0" izz="0"/>'
     whole = '<inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/>'
     assert fault(whole, point.format(-5.4e-20)) == ""
-    assert fault(whole, point.format(-1e-9)) == "link 'l1': ixx is -1e-09, and nothing has less than 0; correct it"
+    assert fault(whole, point.format(-1e-9)) == "link 'l1': ixx is -1e-09, but it cannot be below 0; correct it"
     assert (
         fault(
             '<link name="l2"/>',
@@ -134,8 +134,8 @@ def test_what_is_no_number_is_reported_with_its_place(old: str, told: str, value
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ('value="2"', 'value="-2"', "link 'l1': mass is -2, and nothing has less than 0"),
-        ('iyy="0.1"', 'iyy="-0.1"', "link 'l1': iyy is -0.1, and nothing has less than 0"),
+        ('value="2"', 'value="-2"', "link 'l1': mass is -2, but it cannot be below 0"),
+        ('iyy="0.1"', 'iyy="-0.1"', "link 'l1': iyy is -0.1, but it cannot be below 0"),
         ('value="2"', 'value="1e300"', "link 'l1': mass is 1e+300 kg, which no link of a robot has"),
         ('<mass value="2"/>', "", "link 'l1': its <inertial> has no mass; give it, or leave out <inertial>"),
         ('iyz="0"', "", "link 'l1': its <inertial> has no iyz; give it"),

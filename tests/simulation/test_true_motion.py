@@ -58,7 +58,7 @@ def test_an_arm_that_its_controller_loses_says_when() -> None:
     arm = scara()
     # Of the wrong sign it pushes the arm away.
     wild = replace(arm, controller=replace(arm.controller, proportional=-100.0 * arm.controller.proportional))
-    with pytest.raises(LostArm, match=r"^swing on scara03: the arm got out of control at \d"):
+    with pytest.raises(LostArm, match=r"^swing on scara03: the arm became unstable at \d"):
         simulate(wild, swing(arm.robot, 1.0))
 
 

@@ -167,8 +167,9 @@ class Offset(Filled):
     def notes(self) -> tuple[str, ...]:
         """Say of which joints no offset can be determined, and why."""
         return tuple(
-            f"{self.robot.joints[j]}: what it carries weighs the same wherever the arm is, so that no recording tells an offset of "
-            "its torque from that weight; all of it is taken for weight, and masses are off by the offset over gravity if there is one"
+            f"{self.robot.joints[j]}: it always carries the same weight, so no recording distinguishes an offset of "
+            f"its torque from that weight; the whole constant torque counts as weight, and if there is an offset, "
+            f"masses are wrong by the offset divided by gravity"
             for j in self.left_out
         )
 

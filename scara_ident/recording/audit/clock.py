@@ -65,7 +65,7 @@ def missing_numbers(samples: Samples) -> Checked:
     inside = (start > 0) & (start + length < samples.count)
     longest = int(length[inside].max(initial=1))
     if total > max(MISSING_ROWS, MISSING_SHARE * samples.count):
-        samples.refuse(f"{what}: too many to leave out; record that channel, or cut the file to where it is")
+        samples.refuse(f"{what}: too many to leave out; record that channel, or cut the file to the part that has it")
     if longest > MISSING_RUN:
         samples.refuse(f"{what}, up to {longest} rows in a row; cut the file there, or fill in that channel")
     said = f"{what}: {several(total, 'row')} left out"
@@ -118,8 +118,8 @@ def time_order(samples: Samples) -> Checked:
     first = int(np.argmax(repeated)) + 1
     values = f"{others} with other values" if others else "with the same values"
     said = (
-        f"time stands still in {several(total, 'row')} ({values}), first in {samples.where(first)}: "
-        "the first row of each time kept"
+        f"time does not advance in {several(total, 'row')} ({values}), first in {samples.where(first)}: the first row "
+        f"of each time is kept"
     )
     return samples.kept(np.concatenate(([True], ~repeated))), [Finding("repeated_time", said, total)]
 

@@ -61,7 +61,7 @@ def dead_effort(samples: Samples) -> Checked:
                 samples.refuse(
                     f"{name}.effort is {values[0]:g} throughout although the joint moves by "
                     f"{np.ptp(samples.position[joint]):.3g} {samples.robot.position_unit(joint)}: a dead channel; "
-                    f"record it again, or identify without {name} from recordings in which it stands"
+                    f"record it again, or identify without {name} from recordings in which that joint does not move"
                 )
             said = f"{name}.effort is {values[0]:g} throughout, and the joint does not move: used as it is"
             found.append(Finding("dead_effort", said, samples.count))
@@ -141,8 +141,8 @@ def coarse_effort(samples: Samples) -> Checked:
         torque = float(np.min(np.diff(values))) * abs(samples.robot.effort_gain[joint])
         said = (
             f"{samples.robot.joints[joint]}.effort takes {len(values)} values only, {torque:.3g} "
-            f"{samples.robot.torque_unit(joint)} apart: what rounding leaves repeats with the motion and may look like an "
-            "effect; record it finer"
+            f"{samples.robot.torque_unit(joint)} apart: the rounding error repeats with the motion and may look like "
+            f"an effect; record it with a finer resolution"
         )
         found.append(Finding("coarse_effort", said, samples.count))
     return samples, found

@@ -56,7 +56,7 @@ def held_rows(samples: Samples) -> Checked:
             keep[first + 1 : first + rows] = False
         count, longest = int((~keep).sum()), int(np.argmax(np.where(frozen, length, 0)))
         said = (
-            f"every channel stands still {several(int(frozen.sum()), 'time')} while the arm moves, the longest "
+            f"no channel changes, {several(int(frozen.sum()), 'time')}, while the arm moves, the longest "
             f"{samples.interval * length[longest]:.2g} s from {samples.where(int(start[longest]))}: "
             f"{several(count, 'row')} left out"
         )

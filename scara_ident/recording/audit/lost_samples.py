@@ -59,7 +59,7 @@ def _judged(samples: Samples, missing: Array, least: float) -> Finding | None:
         return None
     usual = round(float(np.median(np.sort(missing[ahead])[np.count_nonzero(back) :])))
     what = (
-        f"samples are lost and the clock was made even over it: "
+        f"samples are lost, but the clock is even (made afterwards): "
         f"{'all joints jump' if len(samples.position) > 1 else 'the joint jumps'} ahead by the way of "
         f"{'a sample or more' if usual < SEVERAL else f'about {usual} samples'} in {100 * share:.2g} % of the steps in motion, "
         f"first before {samples.where(int(np.argmax(ahead)) + 1)}, and in all about {100 * gone:.2g} are missing "

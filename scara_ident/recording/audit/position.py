@@ -76,7 +76,7 @@ def impossible_sizes(samples: Samples) -> Checked:
             continue
         joint = int(np.argmax(wild.sum(axis=1)))
         index, count = int(np.argmax(wild[joint])), int(wild[joint].sum())
-        what = f"{samples.robot.joints[joint]}.{signal} is {rows[joint, index]:.3g} in {samples.where(index)}, which no channel gives"
+        what = f"{samples.robot.joints[joint]}.{signal} is {rows[joint, index]:.3g} in {samples.where(index)}, which is not a possible value"
         if count > max(SPIKE_ROWS, SPIKE_SHARE * samples.count):
             samples.refuse(
                 f"{what}, so in {count} of {samples.count} rows; check the type of its numbers and record it again"
@@ -133,7 +133,7 @@ def position_unit(samples: Samples) -> Checked:
         readings = _readings(robot, joint, low[joint], high[joint])
         fitting = [r for r in readings if _fits(r, robot, joint, low[joint], high[joint], speed[joint])]
         looks = " or ".join(f"{reading.name} ({reading.remedy})" for reading in fitting[:GUESSES])
-        guess = f"it looks like {looks}" if fitting else "it is in no unit that the audit knows"
+        guess = f"it looks like {looks}" if fitting else "its unit is not known to the audit"
         ungeared = abs(robot.reduction[joint]) == 1.0 and not robot.prismatic[joint]
         if ungeared and (not fitting or fitting[0].name == "degrees"):
             guess += ", or it is the motor's angle (state reduction, and side: motor of position, in robot.yaml)"
@@ -141,7 +141,7 @@ def position_unit(samples: Samples) -> Checked:
     also = f" (and {', '.join(others)})" if others else ""
     # What would be within its limits about another zero.
     shifted = beyond[joint] > 0.0 and high[joint] - low[joint] <= reach[joint] and haste[joint] <= 1.0
-    zero = ", or add an offset to it in robot.yaml if it counts from another zero" if shifted else ""
+    zero = ", or add an offset to it in robot.yaml if its zero differs" if shifted else ""
     samples.refuse(
         f"{robot.joints[joint]}.position{also} {seen}: {guess}; convert it to {name}, "
         f"or correct the limits in {robot.urdf.name} if they are wrong{zero}"
@@ -212,11 +212,11 @@ def idle_joints(samples: Samples) -> Checked:
     travel = float(np.max(np.ptp(samples.position[which], axis=1)))
     small = f"(travel at most {travel:.2g} {samples.robot.position_unit(int(which[0]))})"
     if idle.all() and len(which) > 1:
-        said = f"no joint moves {small}: gravity and offsets can be learnt, nothing of motion"
+        said = f"no joint moves {small}: only gravity and offsets can be identified"
         return samples, [Finding("idle_joint", said, len(which), idle=tuple(which.tolist()))]
     names = ", ".join(samples.robot.joints[k] for k in which)
     verb, their = ("does", "its") if len(which) == 1 else ("do", "their")
-    said = f"{names} {verb} not move {small}: nothing is learnt of {their} motion"
+    said = f"{names} {verb} not move {small}: {their} motion is not identified"
     return samples, [Finding("idle_joint", said, len(which), idle=tuple(which.tolist()))]
 
 
@@ -251,9 +251,9 @@ def computed(samples: Samples) -> Checked:
     if any(without_noise(row, np.ones(samples.count, dtype=bool)) for row in samples.effort[moving]):
         return samples, []
     said = (
-        "positions have neither noise nor an encoder's steps, as a simulator gives them: if the arm is a real one they are its "
-        "setpoints, and what its controller lags by looks like friction that builds up or a gear that yields; log the "
-        "measured positions"
+        "positions have neither noise nor an encoder's steps, as a simulator gives them: if this is a real arm they "
+        "are its setpoints, and the lag of its controller looks like friction that builds up or an elastic gear; log "
+        "the measured positions"
     )
     return samples, [Finding("computed_position", said, int(np.count_nonzero(moving)))]
 

@@ -45,8 +45,8 @@ def late_stamps(samples: Samples) -> Checked:
     count, worst = int(np.count_nonzero(off)), float(np.max(np.abs(samples.time - even)))
     first = samples.where(int(np.argmax(off)))
     said = (
-        f"the time stamps of {several(count, 'row')} lie up to {1e3 * worst:.3g} ms off an even clock, first in {first}, and the "
-        "positions do not: the samples are taken as even"
+        f"the time stamps of {several(count, 'row')} differ by up to {1e3 * worst:.3g} ms from an even clock, first in "
+        f"{first}, but the positions do not: the samples are taken as even"
     )
     return replace(samples, time=even), [Finding("late_stamps", said, count)]
 

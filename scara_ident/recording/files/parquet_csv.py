@@ -69,7 +69,7 @@ def column_names(path: Path) -> tuple[str, ...]:
         raise damaged_table(path, error) from error
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
-        raise RecordingError(f"{path}: column {twice[0]!r} stands in the header twice; rename one of them")
+        raise RecordingError(f"{path}: column {twice[0]!r} is in the header twice; rename one of them")
     return tuple(names)
 
 
@@ -215,8 +215,8 @@ def numbers(path: Path, series: pl.Series) -> Array:
                 return stamps
             if (wrong := first_wrong(words)) is not None:
                 raise RecordingError(
-                    f"{path}: column {series.name!r}, row {wrong + 1}: {_short(series[wrong])} is no point in time, as most rows "
-                    "are; correct it or leave it empty"
+                    f"{path}: column {series.name!r}, row {wrong + 1}: {_short(series[wrong])} is no point in time, "
+                    f"unlike most rows; correct it or leave it empty"
                 )
             row = int(bad[0])
             raise RecordingError(

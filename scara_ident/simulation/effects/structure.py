@@ -78,11 +78,11 @@ class Payload(Effect):
         axes = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
         if axes[0] < -1e-12 or axes[2] > (axes[0] + axes[1]) * (1.0 + 1e-9) + 1e-12:
             raise UsageError(
-                f"{self.name}: inertia is that of no body; each principal moment is at most the others' sum"
+                f"{self.name}: no body has this inertia; each principal moment must be at most the sum of the others"
             )
         until = np.inf if self.until is None else self.until
         if until <= self.time:
-            raise UsageError(f"{self.name}: goes at {until:g} s, before it comes at {self.time:g} s")
+            raise UsageError(f"{self.name}: ends at {until:g} s, before it begins at {self.time:g} s")
         turn = turned_frames(arm.robot.model)[-1][-1:]
         draft.carry(turned_bodies(turn, self.body[None])[0], np.array([self.time, until]))
 

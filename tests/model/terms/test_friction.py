@@ -121,7 +121,7 @@ def test_an_axis_that_goes_up_and_down_has_no_offset_of_its_own(robot: Robot):
     np.testing.assert_array_equal(term.of_joints(np.array([0.2, -0.1])), [0.2, -0.1, 0.0])
     np.testing.assert_array_equal(term.state_torque(np.array([0.2, -0.1]))(*np.zeros((3, 3))), [0.2, -0.1, 0.0])
     (note,) = term.notes()
-    assert note.startswith(f"{quill.joints[2]}: what it carries weighs the same wherever the arm is")
+    assert note.startswith(f"{quill.joints[2]}: it always carries the same weight")
     # Every parameter is told by motion; with an offset of that joint six of them are not.
     for model, missing in ((build_model(quill), 0), (whole_model(quill), 1)):
         columns = model.regressor(moved).transpose(2, 0, 1).reshape(600, -1)

@@ -34,7 +34,7 @@ def moved(seed: int = 0, count: int = 6000, lost: float = 0.0, step: float = 1e-
 @pytest.mark.parametrize("lost", [0.02, 0.05, 0.1])
 @pytest.mark.parametrize("step", [0.0, 1e-5, 1e-4])
 def test_many_lost_samples_are_refused_with_their_share(lost: float, step: float):
-    with pytest.raises(RecordingError, match="samples are lost and the clock was made even") as caught:
+    with pytest.raises(RecordingError, match="samples are lost, but the clock is even") as caught:
         restamped(moved(lost=lost, step=step))
     share = re.search(r"in ([0-9.]+) % of the steps", str(caught.value))
     assert share is not None

@@ -54,7 +54,7 @@ def test_late_stamps_are_evened(share: float):
     assert misplaced(samples, even()) < 0.02
     assert finding.kind == "late_stamps"
     assert finding.count == np.count_nonzero(stamps != even())
-    assert "3.92 ms off an even clock" in finding.message
+    assert "3.92 ms from an even clock" in finding.message
 
 
 def test_a_late_stamp_within_a_microsecond_of_the_next_is_too():

@@ -38,7 +38,7 @@ def test_files_that_are_no_recordings_are_refused_in_a_line(robot, tmp_path):
         "log.xlsx": (b"PK", "suffix '.xlsx'"),
         "log": (b"PK", "suffix ''"),
         "log.txt": (b"time,q\n0,1\n", "rename it to log.csv, whatever separates"),
-        "twice.csv": (b"time,joint1.position,joint1.position\n0,1,1\n", "'joint1.position' stands in the header twice"),
+        "twice.csv": (b"time,joint1.position,joint1.position\n0,1,1\n", "'joint1.position' is in the header twice"),
     }
     for name, (content, said) in made.items():
         path = tmp_path / name
@@ -152,7 +152,7 @@ def test_a_date_that_does_not_exist_is_refused_by_its_own_row(robot, tmp_path):
     assert read_recording(write_text(tmp_path / "a.csv", lines), robot).findings == ()
     lines[41] = lines[41].replace("02-28", "02-30")
     message = refusal(write_text(tmp_path / "b.csv", lines), robot)
-    assert "row 41: '2026-02-30 10:00:00.040" in message and "is no point in time, as most rows are" in message
+    assert "row 41: '2026-02-30 10:00:00.040" in message and "is no point in time, unlike most rows" in message
 
 
 def test_a_text_in_a_column_that_is_not_needed_is_no_matter(robot, tmp_path):

@@ -99,9 +99,9 @@ def test_a_payload_that_comes_between_two_steps_is_as_exact_as_on_one() -> None:
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("payload:inertia=1/0/0/0/0/0", "inertia is that of no body"),
-        ("payload:inertia=1/2/0/1/0/1", "inertia is that of no body"),
-        ("payload:from=2,to=1", "goes at 1 s, before it comes at 2 s"),
+        ("payload:inertia=1/0/0/0/0/0", "no body has this inertia"),
+        ("payload:inertia=1/2/0/1/0/1", "no body has this inertia"),
+        ("payload:from=2,to=1", "ends at 1 s, before it begins at 2 s"),
         ("payload:mass=-1", "mass is -1"),
     ],
 )
