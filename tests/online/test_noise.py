@@ -108,5 +108,5 @@ def test_a_band_that_does_has_no_more_of_it_at_its_end_than_of_the_torques():
     # Where all is noise of positions the torque's is as it was given, and no larger than may still be there.
     for whole_of, torque in ((100.0, 1.0), (4.0, 0.2)):
         said = too_wide(np.array([1.2 * whole_of, 0.0]), np.array([whole_of, 1.0]), rows, 10.0, joints)
-        assert said is not None and "makes 100% on a of what" in said
+        assert said is not None and "makes 100% on a of the residual" in said
         assert f"use a band of {10.0 * (0.2 * torque / (1.2 * whole_of)) ** 0.25:.2g} Hz" in said
