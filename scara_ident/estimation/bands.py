@@ -25,7 +25,7 @@ from scara_ident.model.model import TorqueModel
 from scara_ident.motion.prepared import END_PERIODS, PreparedData
 from scara_ident.threads import side_by_side, threads_for
 
-# Independent rows per parameter, at the least: what noise does to the estimate then adds a fifth to the noise variance of
+# Smallest number of independent rows per parameter: what noise does to the estimate then adds a fifth to the noise variance of
 # a prediction, p / N of it (Seber and Lee, Linear Regression Analysis, 2003, section 12.2).
 ROWS_PER_PARAMETER = 5.0
 # A joint that hardly moves is not given more than so many times the band that all joints together need.
@@ -37,7 +37,7 @@ HIGHEST_BAND = 0.2
 # The lowest sample rate that is looked at lets the first band widen so much; so much higher is the next.
 FIRST_WIDENING = 8.0
 NEXT_RATE = 16.0
-# Parameters fitted in a band tell as well how far the motion explains the torque up to so many times that band.
+# Parameters fitted in a band show how well the motion explains the torque up to this many times that band.
 NEAR_FIT = 4.0
 # A band above this share of the highest that a sample rate allows asks for the next.
 NEAR_HIGHEST = 0.5
@@ -54,7 +54,7 @@ class BandChoice:
     explained : tuple of float
         Share of the torque's power within the band that the fit explains, per joint.
     notes : tuple of str
-        What a person should know, such as a joint whose torque the motion does not explain.
+        Remarks for the user, such as a joint whose torque the motion does not explain.
     """
 
     bands: tuple[float, ...]
@@ -82,7 +82,7 @@ def choose_bands(model: TorqueModel, data: PreparedData) -> BandChoice:
     rate = float(np.max(bands)) * FIRST_WIDENING / HIGHEST_BAND
     fit = None
     while True:
-        # In the bands of the first fit where none begins wider, so that what is at rest is not looked for again.
+        # In the bands of the first fit if none begins wider, so that rest is not computed again.
         level = sample(slow if rate == slow_rate else thinned_to(data, rate))
         allowed = HIGHEST_BAND * min(part.rate for part in level.stretches)
         with threads_for(max(part.samples for part in level.stretches)):
@@ -100,14 +100,14 @@ def _widened(
 ) -> tuple[Array, Explained]:
     """Widen bands as far as a fit in them explains the torque, until they stay, and return them with the last fit.
 
-    Each fit leaves a joint's band between the widest that explained beyond itself and the narrowest that did not, which is
-    not tried again: the bracket shrinks from bin to bin, so that this ends, whatever a fit says.
+    Each fit leaves a joint's band between the widest that explained beyond itself and the narrowest that did not, which
+    is not tried again: the bracket shrinks by at least a bin in each round, so the search ends.
     """
     lower, upper = floor.copy(), np.full(len(bands), np.inf)
     bands = np.clip(bands, floor, highest)
     fit = spectra.fit(bands) if known is None else spectra.judged(known.bands, known.value)
     while True:
-        # Where a band holds so much noise that nothing is explained, a narrower one may show what is.
+        # If a band contains so much noise that nothing is explained, a narrower one may explain something.
         wanted = np.where(fit.explains > 0.0, np.minimum(fit.explains, highest), 0.5 * bands)
         wider = wanted >= bands
         lower, upper = np.where(wider, bands, lower), np.where(wider, upper, bands)
@@ -118,7 +118,7 @@ def _widened(
 
 
 def _choice(model: TorqueModel, bands: Array, fit: Explained, edges: Array, floor: Array, moving: Array) -> BandChoice:
-    """Return the choice with what a person should know of it."""
+    """Return the choice with its remarks for the user."""
     place = np.clip(np.searchsorted(edges, bands * (1.0 - 1e-9)) - 1, 0, fit.shares.shape[1] - 1)
     some = fit.explains > 0.0
     explained = np.where(some, fit.shares[np.arange(len(place)), place], 0.0)
@@ -152,7 +152,7 @@ def _needs_longer(model: TorqueModel, joints: Sequence[int], explains: Array, ba
 
 
 def needed_rows(model: TorqueModel) -> Array:
-    """Return how many parameters the rows of each joint have to tell, shape (n,).
+    """Return the number of parameters that the rows of each joint must determine, shape (n,).
 
     A parameter that acts on several joints is shared equally by them. With at least so many rows on every joint, no
     set of joints has fewer rows than there are parameters that act on no other joint (Hall's condition), and all

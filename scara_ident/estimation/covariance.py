@@ -23,9 +23,9 @@ from scara_ident.estimation.joint_rows import JointRows, block_products
 from scara_ident.estimation.student_t import widening
 from scara_ident.threads import side_by_side
 
-# With fewer blocks than this many per parameter the matrix of scores is too noisy to stand for itself.
+# With fewer blocks per parameter than this the matrix of scores is too noisy to be used directly.
 BLOCKS_PER_PARAMETER = 2.5
-# Leverage above which a block fixes a direction all but alone, so that its residual says nothing about it.
+# Leverage above which a block determines a direction almost alone, so its residual contains no information about it.
 FULL_LEVERAGE = 0.99
 # Norm of a block's leverages up to which a series takes a tenth of the time of an eigenvalue problem; at most 53 terms.
 SERIES = 0.5
@@ -33,11 +33,12 @@ SERIES = 0.5
 ROUNDED = 1.0 + 1e-6
 # Redundancy below which nothing is known of a joint's noise.
 NO_REDUNDANCY = 1e-9
-# Parts of a recording, at the most, whose scores are looked at over all times up to the whole of it: neighbouring blocks are one.
+# Largest number of parts of a recording for the correlation over all times up to its length; more blocks are merged
+# with their neighbours.
 MAX_PARTS = 12
 # A variance from fewer degrees of freedom than one is not widened further.
 MIN_FREEDOM = 1.0
-# Blocks whose products with all parameters are made together: those of all of a long recording need not be held.
+# Number of blocks whose products with all parameters are computed together, to limit the memory for long recordings.
 BLOCKS_AT_ONCE = 64
 
 
@@ -94,7 +95,7 @@ def block_covariance(
 
 @dataclass(frozen=True, eq=False)
 class _Scores:
-    """Of one joint, block by block: scores and their products in the directions that its columns tell apart.
+    """The scores of one joint by block, and their products in the directions that its columns determine.
 
     Attributes
     ----------
@@ -120,7 +121,7 @@ def _scores(rows: JointRows, weight: float, root: Array, value: Array) -> _Score
 
 
 def _scattered(joints: Sequence[_Scores], root: Array, owner: NDArray[np.intp]) -> tuple[Array, Array] | None:
-    """Covariance by the scatter of scores block by block, and its freedom; None where a block leaves no residual to judge a direction by."""
+    """Covariance from the scatter of block scores, and its degrees of freedom; None if a block determines a direction alone."""
     products = np.asarray(sum(joint.turn @ joint.products @ joint.turn.T for joint in joints))
     scores = np.asarray(sum(joint.scores @ joint.turn.T for joint in joints))
     # With H = half half', half' (1 - H)^-1/2 = (1 - half' half)^-1/2 half': the smaller of two symmetric problems.
@@ -137,8 +138,8 @@ def _scattered(joints: Sequence[_Scores], root: Array, owner: NDArray[np.intp]) 
 def _of_white(products: Array, root: Array, follows: NDArray[np.bool_]) -> tuple[Array, Array]:
     """Return of each parameter, were residuals white, the share of its variance that blocks and their neighbours show, and its freedom.
 
-    A residual that a fit takes out of one block it adds to the others: scores of neighbours are a little opposed. The freedom is that of as
-    many blocks as tell of the parameter, of equal weight.
+    The fit makes the scores of neighbouring blocks slightly negatively correlated. The degrees of freedom are those of
+    the equivalent number of blocks of equal weight for the parameter.
     """
     variance = np.sum(root**2, axis=1)
     opposed, squares, neighbours = (np.zeros(len(root)) for _ in range(3))
@@ -204,7 +205,7 @@ def _pooled(joints: Sequence[_Scores], root: Array, owner: NDArray[np.intp]) -> 
             matrix += part
             unsure += (np.diag(part) / expected) ** 2 * spread
         else:
-            # Rows that fix the parameters without any redundancy say nothing of the noise.
+            # Rows without redundancy contain no information about the noise.
             unknown |= np.diag(share) > NO_REDUNDANCY * total
     freedom = np.divide(np.diag(matrix) ** 2, unsure, out=np.ones(len(total)), where=unsure > 0.0)
     matrix[np.diag_indices_from(matrix)] = np.where(unknown, np.inf, np.diag(matrix))

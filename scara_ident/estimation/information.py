@@ -263,7 +263,7 @@ class Solution:
     value : ndarray, shape (p,)
         Estimate; along undetermined directions the shortest one in scaled columns.
     undetermined : ndarray of bool, shape (p,)
-        Parameters that rows leave open, alone or in a combination.
+        Parameters that the rows do not determine, alone or in a combination.
     null : ndarray, shape (p, k)
         A basis of the directions that change no predicted torque on these rows.
     """
@@ -318,12 +318,12 @@ def joint_noise(joints: Sequence[Information]) -> Array:
 
 
 def residual_noise(joints: Sequence[Information], value: Array) -> Array:
-    """Return the std of each joint's rows as the residuals of parameters tell it, shape (n,), see `Information.noise`."""
+    """Return the std of each joint's rows from the residuals of parameters, shape (n,), see `Information.noise`."""
     return np.array([part.noise(value) for part in joints])
 
 
 def _surely_determined(factor: Array, right: Array) -> Array | None:
-    """Solve a system whose columns have unit length; None where it is not triangular or might leave a direction open."""
+    """Solve a system whose columns have unit length; None if it is not triangular or a direction may be undetermined."""
     from scipy.linalg.lapack import dtrcon, dtrtrs
 
     size = factor.shape[1]

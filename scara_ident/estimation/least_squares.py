@@ -90,7 +90,7 @@ def equally(joints: Sequence[Information]) -> Array:
 
 
 def by_noise(joints: Sequence[Information]) -> Array:
-    """Return each joint's weight by what is left of its rows, shape (n,)."""
+    """Return each joint's weight from its residual, shape (n,)."""
     return 1.0 / joint_noise(joints)
 
 
@@ -116,14 +116,14 @@ class _Fit:
 
 
 def _fit(observations: Observations, weigh: Weigh, method: str, prior: Information | None) -> _Fit:
-    """Solve; with weights and without a prior, what data leave open of the torque is left at zero, see `determined_directions`."""
+    """Solve; with weights and without a prior, directions that the data do not determine stay at zero, see `determined_directions`."""
     joints = _joints(observations)
     weights = weigh(joints)
     information = weighted(joints, weights)
     if prior is not None:
         information = merge([information, prior])
     solution = information.solve()
-    # Equal weights stay what they are in the literature, the paper's among it.
+    # With equal weights the result is that of the literature and the paper.
     directions = (
         determined_directions(observations, residual_noise(joints, solution.value))
         if prior is None and method == "wls"
@@ -204,7 +204,7 @@ def least_squares(
 
 
 def _variation(observations: Observations, fit: _Fit, rows: OffsetRows) -> RunVariation:
-    """Return how runs differ; of files longer than the memory holds, in the offsets that what is kept of them shows."""
+    """Return the differences between runs; for files that are too long for the memory, the offsets of the part kept."""
     kept = observations.in_memory
     taken = rows.taken(fit.inverse, fit.weights)
     found = run_variation(kept, kept.joints, fit.value, taken=taken, of_two=True)
@@ -237,7 +237,7 @@ def value_and_weights(observations: Observations, offsets: RunVariation | None =
 def determined_value_and_weights(
     observations: Observations, offsets: RunVariation | None = None
 ) -> tuple[Array, Array]:
-    """Return the same with what data leave open of the torque within the arm's limits at zero, as `wls` leaves it.
+    """Return the same, with directions that the data do not determine within the arm's limits at zero, as in `wls`.
 
     Parameters
     ----------

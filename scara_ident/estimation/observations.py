@@ -200,7 +200,7 @@ class Observations(Frozen):
         return self._of_last("_late", value, lambda: self._lacking(self.predicted(value)))
 
     def late_reversals(self, value: Array) -> tuple[Array, ...]:
-        """Return the same of Coulomb friction alone, which changes where a joint reverses: presliding makes it late too.
+        """Return the same for Coulomb friction alone, which changes where a joint reverses: with presliding it is late too.
 
         That of the last parameters is kept.
         """
@@ -226,7 +226,7 @@ class Observations(Frozen):
         return np.isin(self.joints[joint].columns, np.concatenate([np.zeros(0, dtype=np.intp), *found]))
 
     def _lacking(self, torques: Sequence[Array]) -> tuple[Array, ...]:
-        """Return for each joint what a torque on every stretch (n, N) lacks on its rows for each second it is late."""
+        """Return for each joint the error on its rows of a torque on every stretch (n, N) per second of delay."""
         parts = [(part, torque) for part, torque in zip(self.data.stretches, torques, strict=True) if part.usable]
 
         def of_joint(joint: int) -> Array:
@@ -237,7 +237,7 @@ class Observations(Frozen):
         return tuple(side_by_side(of_joint, range(len(self.joints))))
 
     def _of_last(self, name: str, value: Array, made: Callable[[], tuple[Array, ...]]) -> tuple[Array, ...]:
-        """Return what is kept of the last parameters, made anew where these are others."""
+        """Return the cached result for the last parameters, computed again if these differ."""
         known = self.__dict__.get(name)
         if known is None or not np.array_equal(known[0], value):
             known = self.__dict__[name] = value.copy(), made()
@@ -297,7 +297,7 @@ def observe(model: TorqueModel, data: PreparedData, known: Observations | None =
 
 
 def _key(item: PreparedRecording) -> tuple[int, ...]:
-    """Return what tells recordings in the same bands apart: which one it is, and what of it is left out."""
+    """Return the key of a recording in given bands: which one it is, and the parts left out."""
     return (id(item.recording), *(id(part.left_out) for part in item.stretches))
 
 
@@ -307,7 +307,7 @@ def kept_rows(item: PreparedRecording) -> int:
 
 
 def informations(model: TorqueModel, data: PreparedData) -> tuple[Information, ...]:
-    """Return `Observations.by_joint` of what `observe` would make, without keeping any row.
+    """Return `Observations.by_joint` of the result of `observe`, without keeping any row.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A robust fit, which no single stretch of time can steer, beside least squares.
+"""A robust fit, in which the influence of each stretch of time is bounded.
 
 Each joint's rows in each block of time have a weight by their rms residual d, in units of the joint's noise floor (the
 median over blocks): Huber's first, min(1, c / d), then Tukey's bisquare, (1 - (d / k)^2)^2, which gives up what is far off
@@ -28,7 +28,7 @@ from scara_ident.threads import one_blas_thread, side_by_side
 # varies by 22 %, so that neither touches it.
 HUBER = 1.5
 TUKEY = 5.0
-# Rounds of reweighting with each; what moves after them is below a hundredth of a standard deviation.
+# Rounds of reweighting with each; later changes are below a hundredth of a standard deviation.
 HUBER_ROUNDS, TUKEY_ROUNDS = 4, 3
 # Rows for each direction that acts on a joint, beyond which its residual is its noise.
 ROWS = 2
@@ -45,7 +45,7 @@ class RobustFit:
     Attributes
     ----------
     value : ndarray, shape (p,)
-        What rows leave open is zero.
+        Directions that the rows do not determine are zero.
     noise : ndarray, shape (n,)
         Noise floor of each joint: the median rms residual of its blocks, N m or N.
     weights : tuple of ndarray, shape (blocks,)
@@ -76,7 +76,7 @@ def robust_fit(observations: Observations) -> RobustFit:
     joints = side_by_side(of_joint, observations.joints, observations.by_joint)
     weights = [np.ones(len(joint.rows)) for joint in joints]
     point = _reweighted(joints, weights, noise, np.zeros(root.shape[1]), _huber, HUBER_ROUNDS)
-    # Where no event steers the noise any more, what data leave open is left at zero, as by `wls`.
+    # Once events no longer influence the noise, directions that the data do not determine stay at zero, as in `wls`.
     directions = determined_directions(observations, noise)
     if directions is not None:
         kept, sizes = np.linalg.qr((whole @ root).T @ (whole @ directions.kept))
@@ -94,12 +94,13 @@ def _reweighted(
     weigh: Callable[[Array], Array],
     rounds: int,
 ) -> Array:
-    """Go on with weights and noise, which change in place, and return the point that they stand for."""
+    """Continue with weights and noise, which are changed in place, and return the resulting estimate."""
     for _ in range(rounds):
         point = _solved(joints, weights, noise, point)
         for j, joint in enumerate(joints):
             rms = joint.rms(point)
-            # A joint of few rows may be met exactly, which tells nothing of its noise and would give it all weight.
+            # A joint with few rows may be fitted exactly; this contains no information about its noise and would give
+            # it all the weight.
             floor = median(rms[joint.rows > 0]) if joint.rows.sum() > ROWS * len(joint.own) else 0.0
             # Weights as with one joint's own noise, so that none is fitted at another's cost.
             noise[j] = floor or noise[j]

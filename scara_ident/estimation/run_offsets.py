@@ -1,6 +1,6 @@
 """Rows in which offsets that differ from run to run are part of the noise (generalised least squares).
 
-One offset for all runs leaves each run's own to be explained by something else: gravity, where motions differ. Generalised
+With one offset for all runs something else absorbs each run's own offset: gravity, if motions differ. Generalised
 least squares (Aitken 1936) takes them for draws of a variance, so that a run says little of its mean torque and all it knows
 of the rest. Offsets alone are weighted so: a model that lacks something seems to differ from motion to motion in friction
 and torque scale, and to weigh those down would leave it to the motions that it fits best.
@@ -73,7 +73,7 @@ def beside_offsets(observations: Observations, offsets: RunVariation | None) -> 
     Parameters
     ----------
     offsets : RunVariation or None
-        How far they lie apart, see `RunVariation.offsets`; None where they do not.
+        The scatter of the offsets, see `RunVariation.offsets`; None if they do not differ.
     """
     if offsets is None:
         return OffsetRows(observations, None)
@@ -81,7 +81,7 @@ def beside_offsets(observations: Observations, offsets: RunVariation | None) -> 
 
 
 def larger_offsets(one: RunVariation | None, other: RunVariation | None) -> RunVariation | None:
-    """Return of each joint the offsets that lie further apart; None where there are none.
+    """Return for each joint the offsets with the larger scatter; None if there are none.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def _apart(item: JointVariation) -> float:
 
 
 def offsets_on(observations: Observations, offsets: RunVariation | None) -> RunVariation | None:
-    """Return the same offsets on other rows of the same runs, as of another band; white noise of a row is the same there.
+    """Return the same offsets on other rows of the same runs, such as in another band, with the same white noise per row.
 
     Parameters
     ----------

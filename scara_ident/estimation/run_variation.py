@@ -40,14 +40,14 @@ _DIFFERING = (*(f"its {kind}" for kind in KINDS[:DELAY]), "what looks like a del
 
 # With fewer recordings than this none can be distinguished from the parameters.
 MIN_RUNS = 3
-# Of differences below this share of the torque nothing is said in words.
+# Differences below this share of the torque are not reported in sentences.
 SPOKEN_OF = 0.01
-# Delays of runs whose mean is so many of their standard deviations are one delay: no parameter takes up their mean.
+# Delays of runs whose mean is this many of their standard deviations are a common delay, which no parameter absorbs.
 COMMON_DELAY_STDS = 2.0
 # Probability, by Student's t of so many runs, below which chance does not make their mean: three runs whose mean is two of their
 # standard deviations, no more likely to be late than early, are had once in fourteen times.
 CHANCE = 0.01
-# Directions of a run below this share of the largest are not told apart.
+# Directions of a run below this share of the largest are not distinguished.
 RANK = 1e-9
 
 
@@ -58,17 +58,17 @@ class JointVariation:
     Attributes
     ----------
     directions : ndarray, shape (kinds, N)
-        Rows of what one unit of each kind does: the friction predicted, the torque predicted, 1 N m, 1 s.
+        Rows of one unit of each kind: predicted friction, predicted torque, 1 N m, 1 s.
     std : ndarray, shape (kinds,)
         Standard deviation between runs, in these units.
     of_run : ndarray, shape (runs, kinds)
-        By how much each run lies off the mean, shrunken as its noise asks.
+        Deviation of each run from the mean, shrunk according to its noise.
     noise : float
         Standard deviation of one row.
     bounds : ndarray of int, shape (runs + 1,)
         Where the rows of each run begin.
     unsure : ndarray, shape (runs, kinds)
-        Variance of what each run lies off by.
+        Variance of these deviations.
     memory : float
         How many times the variance of white noise the noise has along the offset: what a model lacks changes slowly.
     assumed : bool
@@ -100,12 +100,12 @@ class JointVariation:
 
     @property
     def off(self) -> Array:
-        """By how much the rows of every run lie off those of the mean run, shape (N,)."""
+        """Deviation of the rows of every run from those of the mean run, shape (N,)."""
         return np.asarray(np.sum(np.repeat(self.of_run, np.diff(self.bounds), axis=0).T * self.directions, axis=0))
 
     @cached_property
     def shrinking(self) -> tuple[tuple[Array, Array], ...]:
-        """For each run orthonormal rows (r, N) and the share that stays of what lies along them (r,)."""
+        """For each run orthonormal rows (r, N), and the share (r,) of signals along them that whitening keeps."""
         found = []
         size = self.std / self.noise
         for start, stop in zip(self.bounds[:-1], self.bounds[1:], strict=True):
@@ -117,7 +117,7 @@ class JointVariation:
         return tuple(found)
 
     def whitened(self, signals: Array) -> Array:
-        """Return signals on the joint's rows, shape (k, N), with what runs differ by weighted as the noise it is."""
+        """Return signals on the joint's rows, shape (k, N), whitened with the differences between runs as noise."""
         result = signals.copy()
         for (rows, stays), start, stop in zip(self.shrinking, self.bounds[:-1], self.bounds[1:], strict=True):
             part = signals[:, start:stop]
@@ -132,7 +132,7 @@ class RunVariation:
     Attributes
     ----------
     delays : SharedDelays or None
-        By how much each run is late as all joints tell it; None where they were not asked.
+        Delay of each run, pooled over all joints; None if not estimated.
     """
 
     joints: tuple[JointVariation | None, ...]
@@ -140,7 +140,7 @@ class RunVariation:
 
     @property
     def kinds(self) -> tuple[str, ...]:
-        """What each kind is called: of a delay that joints do not share it is not said that it is one."""
+        """The name of each kind: a delay that joints do not share only looks like one, and is named so."""
         late = KINDS[DELAY] if self.delays is None or self.delays.differ else LIKE_DELAY
         return (*KINDS[:DELAY], late, *KINDS[DELAY + 1 :])
 
@@ -153,12 +153,12 @@ class RunVariation:
         }
 
     def sentences(self, robot: Robot, unexplained: str | None = None) -> list[str]:
-        """Return in words what differs by more than a hundredth of the torque.
+        """Return in sentences the differences of more than a hundredth of the torque.
 
         Parameters
         ----------
         unexplained : str, optional
-            Joint of which no model explains the torque: what it lacks differs from motion to motion too.
+            Joint with an unexplained remainder, which differs from motion to motion too.
         """
         shared = self.delays if self.delays is not None and self.delays.differ else None
         found = []
@@ -230,7 +230,7 @@ class RunVariation:
         return RunVariation(joints) if any(joints) else None
 
     def on(self, observations: Observations, value: Array) -> RunVariation:
-        """Return how other runs differ, of which by how much each lies off is not known.
+        """Return the differences for other runs, whose single deviations are not known.
 
         Parameters
         ----------
@@ -256,12 +256,12 @@ class RunVariation:
         return RunVariation(tuple(joints))
 
     def deviations(self, observations: Observations, value: Array) -> tuple[Array, ...]:
-        """Return by how much the torque of each run lies off that of the mean run, on every stretch, shape (n, N) each.
+        """Return the deviation of the torque of each run from that of the mean run, on every stretch, shape (n, N) each.
 
         Parameters
         ----------
         observations : Observations
-            With all columns that the differences were estimated beside.
+            With all columns of the model in which the differences were estimated.
         value : ndarray, shape (p,)
             Their parameters.
         """
@@ -279,12 +279,12 @@ class RunVariation:
         return tuple(found)
 
     def mean_squares(self, joints: Sequence[JointRows]) -> Array:
-        """Return the mean square of that over the samples that the rows of each joint stand for, shape (n,)."""
+        """Return the mean square of the deviations over the samples of each joint's rows, shape (n,)."""
         parts = zip(self.joints, joints, strict=True)
         return np.array([0.0 if item is None else np.sum(item.off**2) / np.sum(rows.counts) for item, rows in parts])
 
     def covariance(self, inverse: Array, joints: Sequence[JointRows], weights: Array) -> Array:
-        """Return what the differences add to the covariance of a least-squares estimate, shape (p, p).
+        """Return the contribution of the differences to the covariance of a least-squares estimate, shape (p, p).
 
         Parameters
         ----------
@@ -346,7 +346,7 @@ def late_by_few(item: JointVariation) -> float:
 
 
 def late_words(item: JointVariation, late: float) -> str:
-    """Return what the torque of a joint does that is late by so many seconds, in every run."""
+    """Return in words that the torque of a joint has this delay in every run."""
     if abs(late) > item.reach:
         return "leaves a part in proportion to its torque's derivative that is too large for a delay"
     return f"{'lags' if late > 0.0 else 'leads'} by {1e3 * abs(late):.2g} ms"
@@ -361,13 +361,13 @@ def unit_of_kind(robot: Robot, joint: str, kind: str) -> str:
 
 
 def directions_of(observations: Observations, joint: int, rows: JointRows, value: Array) -> Array:
-    """Return what one unit of each kind does on the rows of a joint, shape (kinds, N); zero where it does nothing."""
+    """Return one unit of each kind on the rows of a joint, shape (kinds, N); zero if it has no influence."""
     late = observations.late(value[: observations.parameters])[joint]
     return _of_columns(observations, rows.columns, value, rows.table[:-1], late)
 
 
 def offset_direction(model: TorqueModel, rows: JointRows) -> Array:
-    """Return what an offset of one unit does on the rows of a joint, shape (N,)."""
+    """Return an offset of one unit on the rows of a joint, shape (N,)."""
     return np.asarray(np.sum(rows.table[:-1][_of_terms(model, rows.columns, Offset)], axis=0))
 
 
@@ -384,7 +384,7 @@ def _of_terms(model: TorqueModel, columns: NDArray[np.intp], kind: type[Term]) -
 def _of_columns(
     observations: Observations, columns: NDArray[np.intp], value: Array, signals: Array, rate: Array
 ) -> Array:
-    """Return what one unit of each kind does, of the columns (k, N) of a joint and what one second of delay does."""
+    """Return one unit of each kind, from the columns (k, N) of a joint and from the change by one second of delay."""
     friction, offset = (_of_terms(observations.model, columns, kind) for kind in (Friction, Offset))
     own_value = value[columns]
     return np.array(

@@ -1,4 +1,4 @@
-"""Events: what is local in time is no parameter. Found on a robust fit, named, and kept out of the fit."""
+"""Events, which are local in time and no parameter: found with a robust fit, named, and left out of the fit."""
 
 from __future__ import annotations
 
@@ -23,25 +23,25 @@ from scara_ident.robot.kinematics import constant_force, force_torques
 from scara_ident.robot.robot import Robot
 from scara_ident.threads import one_blas_thread
 
-# Events closer than this are one; as much is left out on either side, because the ends are known to that, s.
+# Events closer than this count as one; as much is left out on either side, which is the accuracy of the ends, s.
 MARGIN = 0.1
-# In words an end that is known to less, s, is said to be so.
+# An end that is less accurate than this, s, is reported with its interval.
 SAID_UNSURE = 0.3
 # Time stamps are known to rounding only, s.
 ROUNDING = 1e-6
 # A constant force at the tool explains at least this share of the squared residual of a contact there.
 FITS = 0.75
-# How far beyond an event it is asked what its force would do, s.
+# Time on either side of an event in which the torque of its force is computed, s.
 NEAR_ENDS = 2.0
 # States at which the tool's Jacobian is taken.
 STATES = 40
 # Two lists hold the same event where their times overlap by this share.
 SAME_OVERLAP = 0.5
-# Events that are said in words: a long file may have hundreds.
+# Number of events reported in sentences: a long file may have hundreds.
 MAX_SENTENCES = 20
-# Another joint is named with an event if it stands out by this share of what would make it one.
+# Another joint is named with an event if it exceeds this share of the threshold of an event.
 SHARED = 0.45
-# Share of a repetition's residual at the same place that makes it the motion's doing.
+# If a repetition has this share of the residual at the same place, it comes from the motion.
 REPEATED = 0.4
 
 
@@ -137,7 +137,7 @@ class Event:
 
 
 def event_notes(robot: Robot, events: Sequence[Event]) -> list[str]:
-    """Return events in words, of very many those that stand out most."""
+    """Return events in sentences; of very many the clearest ones."""
     least = sorted((event.score for event in events), reverse=True)[:MAX_SENTENCES]
     said = [event for event in events if event.score >= least[-1]][:MAX_SENTENCES] if least else []
     more = [f"{len(events) - len(said)} more events are listed in the result"] if len(events) > len(said) else []
@@ -146,7 +146,7 @@ def event_notes(robot: Robot, events: Sequence[Event]) -> list[str]:
 
 @one_blas_thread()
 def find_events(observations: Observations, value: Array, fitted: Observations | None = None) -> tuple[Event, ...]:
-    """Find what is local in time in recordings; what was left out of them counts again.
+    """Find events in recordings; parts that were left out are included again.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ def find_events(observations: Observations, value: Array, fitted: Observations |
     value : ndarray, shape (p,)
         Parameters that no event has steered, see `robust_fit`.
     fitted : Observations, optional
-        Of the recordings that were fitted, where these are others: what is usual shows there too.
+        Observations of the fitted recordings, if these are others: the usual residual is taken from them too.
     """
     data, robot = observations.data, observations.model.robot
     parts, left, owner = _residuals(observations, value)
@@ -168,7 +168,7 @@ def find_events(observations: Observations, value: Array, fitted: Observations |
     noise = bounded_noise(parts, left, owner)
     stretches = [binned(k, part, row, noise[k]) for k, part, row in zip(owner, parts, left, strict=True)]
 
-    # A repetition is asked as well for what is left once the motion's doing is off.
+    # A repetition is checked too, after the part that depends on the motion is subtracted.
     without_motion = without_states(stretches)
     clean = without_trends(without_motion)
 
@@ -188,7 +188,7 @@ def find_events(observations: Observations, value: Array, fitted: Observations |
         if item.binned.recording < len(data.recordings) and not _repeated(item, clean, data)
     ]
     if found:
-        # Of an exact fit only rounding is left, which may stand out from itself.
+        # The residual of an exact fit is rounding, which may look like an event.
         least = MIN_NOISE_SHARE * observations.unfiltered_torque_rms
         found = [event for event in found if event.rms > least[robot.joints.index(event.joints[0])]]
     return tuple(sorted(found, key=lambda event: (data_place(data, event.recording), event.start)))
@@ -213,7 +213,7 @@ def data_place(data: PreparedData, name: str) -> int:
 
 
 def without_events(observations: Observations, events: Sequence[Event]) -> Observations:
-    """Return observations with events, and nothing else, left out; the columns at every sample are shared.
+    """Return observations with only the events left out; the columns at every sample are shared.
 
     Parameters
     ----------
@@ -234,7 +234,7 @@ def without_events(observations: Observations, events: Sequence[Event]) -> Obser
 
 
 def left_out(data: PreparedData, events: Sequence[Event]) -> PreparedData:
-    """Return recordings that count as at rest during events, and at no other time for one."""
+    """Return recordings that count as at rest during events, and at no other time because of an event."""
     recordings = tuple(
         _left_out(item, [event for event in events if event.recording == item.name]) for item in data.recordings
     )
@@ -259,7 +259,7 @@ def _left_out(item: PreparedRecording, events: Sequence[Event]) -> PreparedRecor
 
 
 def same_events(one: Sequence[Event], other: Sequence[Event]) -> bool:
-    """Whether two lists hold the same events, whose ends may differ a little."""
+    """Whether two lists contain the same events, up to small differences of their ends."""
 
     def held(event: Event, events: Sequence[Event]) -> bool:
         both = (
@@ -307,7 +307,7 @@ def _event(robot: Robot, data: PreparedData, segment: Segment, left: Array, *, h
 
 
 def _of_tool_force(robot: Robot, item: Binned, start: int, stop: int) -> Array | None:
-    """Return what the constant force on the tool that fits an event makes of every bin near it, if it is one, shape (n, M)."""
+    """Return the torque in every bin near an event of the constant tool force that fits it, if one does, shape (n, M)."""
     force, fit = tool_force(robot, item, start, stop)
     if fit < FITS:
         return None
@@ -319,7 +319,7 @@ def _of_tool_force(robot: Robot, item: Binned, start: int, stop: int) -> Array |
 
 
 def _per_force(robot: Robot, item: Binned, bins: Sequence[int]) -> Iterator[Array]:
-    """Give what a unit of each force on the tool takes from the torque of the drives, recorded side, shape (n, 3)."""
+    """Return the change of the drives' torque by a unit of each force on the tool, recorded side, shape (n, 3)."""
     states = configurations(robot.model, item.state[0][np.argsort(robot.order)][:, list(bins)])
     return (-turned for turned in force_torques(robot, states.T))
 

@@ -1,4 +1,4 @@
-"""The main job: from recordings to parameters, how sure they are, and what they predict."""
+"""The main task: from recordings to parameters, their standard deviations, and their predictions."""
 
 from __future__ import annotations
 
@@ -126,7 +126,7 @@ class Identification(Saved, reported_by="identification"):
         return self._errors(self.validation)
 
     def _errors(self, observations: Observations) -> dict[str, tuple[JointError | None, ...]]:
-        # One after the other: each is so short that two threads would only hand the interpreter's lock over.
+        # One after the other: each is so short that two threads would only compete for the interpreter's lock.
         with one_thread():
             return {item.name: self.estimate.errors(item) for item in observations.each}
 
@@ -237,7 +237,7 @@ def identify(
         raise EstimationError("; ".join(str(fault) for fault in faults)) from error
     differs = None
     if robust is not None:
-        # Both of the same samples, and neither held by what an arm can have.
+        # Both estimates are of the same samples, and without constraints.
         plain = estimate
         if isinstance(estimate, ConsistentEstimate):
             plain = wls(training.in_memory)
@@ -262,7 +262,7 @@ def identify(
 def known_information(
     model: TorqueModel, recordings: Sequence[Recording], rate: float, weights: Array | None = None
 ) -> Information:
-    """Return what recordings already say of a model, as if sampled at ``rate`` per second.
+    """Return the information of existing recordings about a model, as if sampled at ``rate`` per second.
 
     Parameters
     ----------
@@ -349,15 +349,16 @@ def check_held_out(recordings: Sequence[Recording], validation: Sequence[Recordi
 
 
 def undetermined(identification: Identification) -> list[str]:
-    """Return the names of the parameters that the data leave open."""
+    """Return the names of the parameters that the data do not determine."""
     estimate = identification.estimate
     return [name for name, open_ in zip(estimate.model.names, estimate.undetermined, strict=True) if open_]
 
 
 def determined_in_sums(identification: Identification) -> list[str]:
-    """Return the names of determined parameters of bodies that are less sure than all bodies of the description are large.
+    """Return the names of body parameters that are determined, but with a standard deviation larger than the sum of all bodies in the description.
 
-    They hardly differ from sums of others, as where an angle of the description has few digits: the torque determines them together.
+    They are almost sums of others, for example because an angle in the description has few digits: the torque
+    determines only the sums.
     Where efforts are in units of their own, bodies are as many times larger.
     """
     estimate, robot, term = identification.estimate, identification.model.robot, identification.model.rigid_body
@@ -379,14 +380,14 @@ def insignificant_parameters(identification: Identification) -> list[str]:
 
 
 def of_unknown_std(identification: Identification) -> list[str]:
-    """Return the names of the determined parameters whose standard deviation the recordings do not tell."""
+    """Return the names of the determined parameters whose standard deviation the recordings do not determine."""
     estimate = identification.estimate
     unknown = ~np.isfinite(estimate.std) & ~estimate.undetermined
     return [name for name, is_unknown in zip(estimate.model.names, unknown, strict=True) if is_unknown]
 
 
 def worst_validation(identification: Identification) -> tuple[str, str, JointError] | None:
-    """Return the held-out recording and joint with the largest relative error within the band, beside offsets that differ."""
+    """Return the held-out recording and joint with the largest relative error within the band, after offsets that differ are removed."""
     found = [
         (error.beside_own_offset[1], name, joint, error)
         for name, errors in identification.validation_errors().items()

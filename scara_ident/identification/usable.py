@@ -1,4 +1,4 @@
-"""Which recordings can be used: one without information is left out and named; if none is left, that is an error."""
+"""Which recordings can be used: one without information is left out and named; if none remains, that is an error."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ from scara_ident.recording.shared_samples import copies_among
 from scara_ident.robot.robot import Robot
 from scara_ident.threads import side_by_side
 
-# A recording of which more was recorded before is a copy of that, whatever else it holds.
+# A recording with more than this share of samples of an earlier one counts as a copy, whatever the rest is.
 MOSTLY = 0.5
-# Recordings that a note lists by name; of more the same is said once, with the numbers of the first.
+# Number of recordings that a note lists by name; for more there is one note, with the numbers of the first.
 LISTED = 3
-# A number that stands alone, and not within a name.
+# A number that is not part of a name.
 _NUMBER = re.compile(r"(?<![\w.])[-+]?\d[\w.+-]*")
 # An rms of so many independent values is known to 1 / sqrt(2 N), here 22 % (the standard error of a standard deviation).
 MIN_ROWS = 10
@@ -43,14 +43,14 @@ def usable_in_bands(
     alike: bool = False,
     held: bool = False,
 ) -> tuple[PreparedData, PreparedData, list[str]]:
-    """Make recordings ready in their bands, without those that say nothing.
+    """Prepare recordings in their bands, without those that contain no information.
 
     Parameters
     ----------
     recordings : sequence of Recording
         At least one of them is left.
     validation : sequence of Recording, optional
-        Take no part in the choice of bands; where there are any, at least one is left.
+        Not used in the choice of bands; if there are any, at least one remains.
     bands : sequence of float or None, one per joint, optional
         Hz; chosen from the recordings by default.
     alike : bool, optional
@@ -61,7 +61,7 @@ def usable_in_bands(
     Returns
     -------
     notes : list of str
-        What was found in the data, and what was left out and why.
+        Findings in the data, and what was left out and why.
 
     Raises
     ------
@@ -97,7 +97,7 @@ def _bands_of(model: TorqueModel, data: PreparedData, *, alike: bool) -> tuple[B
     while True:
         choice = choose_bands(model, data)
         if alike:
-            # A joint whose model lacks something seems to have less band than it has.
+            # A joint with a missing effect seems to have a smaller band than it has.
             choice = replace(choice, bands=(max(choice.bands),) * len(choice.bands))
         left, short = with_rows(data.at(choice.bands), model.robot, needed=True)
         if not short:
@@ -106,7 +106,7 @@ def _bands_of(model: TorqueModel, data: PreparedData, *, alike: bool) -> tuple[B
 
 
 def without_copies(recordings: Sequence[Recording]) -> tuple[list[Recording], list[str]]:
-    """Return recordings without copies of others among them, which would make parameters look surer than they are, and say which."""
+    """Return recordings without copies of others, which would make standard deviations too small, with notes on the copies."""
     copies, kept, notes = copies_among(recordings), [], []
     for place, recording in enumerate(recordings):
         if place not in copies:
@@ -123,12 +123,12 @@ def without_copies(recordings: Sequence[Recording]) -> tuple[list[Recording], li
 
 
 def usable_data(recordings: Sequence[Recording]) -> tuple[PreparedData, list[str]]:
-    """Make recordings ready, without those that have no effort or no four samples in a row, and say which.
+    """Prepare recordings, without those that have no effort or no four samples in a row, with notes on these.
 
     Raises
     ------
     RecordingError
-        That of the first recording, if none is left.
+        The error of the first recording, if none remains.
     """
     kept, notes, errors = [], [], []
     for recording in recordings:
@@ -146,12 +146,12 @@ def usable_data(recordings: Sequence[Recording]) -> tuple[PreparedData, list[str
 
 
 def with_rows(data: PreparedData, robot: Robot, *, needed: bool) -> tuple[PreparedData, list[str]]:
-    """Return recordings in their bands without those that have next to no rows, and say which.
+    """Return recordings in their bands without those that have almost no rows, with notes on these.
 
     Parameters
     ----------
     needed : bool
-        Whether at least one has to be left; if all have too few, all are.
+        Whether at least one must remain; if all have too few rows, all are kept.
     """
     rows = side_by_side(kept_rows, data.recordings)
     kept = [k for k, count in enumerate(rows) if count >= MIN_ROWS]
@@ -174,7 +174,7 @@ def _because(item: PreparedRecording, robot: Robot) -> str:
 
 
 def check_rows(observations: Observations) -> None:
-    """Refuse fewer rows than parameters: they would be met exactly, whatever they are, and predict nothing.
+    """Refuse fewer rows than parameters: any such rows are fitted exactly, and the result predicts nothing.
 
     Raises
     ------
@@ -193,7 +193,7 @@ def check_rows(observations: Observations) -> None:
 
 
 def data_notes(*data: PreparedData) -> list[str]:
-    """Return what the audits found, the same remark on many recordings in one line, and where names contradict motions."""
+    """Return the findings of the audits, with one line for the same finding on many recordings, and contradictions of names and motions."""
     items = [item for part in data for item in part.recordings]
     audits = side_by_side(lambda item: audit_velocity(item.recording, item.longest.stretch), items)
     notes = _once((item.name, finding.message) for item in items for finding in item.recording.findings)
@@ -203,7 +203,7 @@ def data_notes(*data: PreparedData) -> list[str]:
 
 
 def _once(said: Iterable[tuple[str, str]]) -> list[str]:
-    """Return remarks on recordings, each a name and what is said of it, the same remark on many in one line."""
+    """Return remarks on recordings, each a name and a remark, with one line for the same remark on many."""
     found: dict[str, dict[str, list[str]]] = {}
     for name, remark in said:
         found.setdefault(_NUMBER.sub("", remark), {}).setdefault(remark, []).append(name)
