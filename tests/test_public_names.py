@@ -90,4 +90,4 @@ def test_of_what_no_arm_can_be_the_nearest_is_exported_and_said(tmp_path: Path):
     recording = simulate(virtual_arm(robot), named_motion("OJD", robot), rate=250.0).recording
     found = identify(robot, [replace(recording, effort=recording.effort * [[1.0], [-1.0]])], method="ols")
     notes = export_urdf(found, tmp_path / "arm.urdf")
-    assert notes[0].startswith("no arm can have the identified parameters; this is the one that explains")
+    assert notes[0].startswith("the identified parameters are not physically consistent; ")

@@ -17,7 +17,7 @@ def test_an_empty_folder_asks_for_a_first_motion(command, steps, tmp_path: Path)
     (tmp_path / "arm").mkdir()
     (tmp_path / "arm" / "run_1.csv").write_text("time\n")
     result = command("ask", tmp_path / "arm", *QUICK, "--tool-speed", "0.5")
-    assert "run_1.csv lies beside recordings/ and is not read" in result.out
+    assert "run_1.csv is beside recordings/ and is not read" in result.out
     assert steps[0] == "designing: search 1" and steps[-1].endswith(" done")
     assert result.status == 0 and "There are no recordings yet" in result.out
     assert "Collisions were not checked" in result.out + result.err

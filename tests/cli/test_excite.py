@@ -65,7 +65,7 @@ def test_start_limits_block_and_known_torques_are_heeded(command, tmp_path: Path
     assert bounds["joint1.position.upper"] == 2.0 and bounds["joint1.velocity"] == 1.5
     assert bounds["joint2.torque"] == 0.8 and bounds["tool.acceleration"] == 6.0 and bounds["tool.speed"] == 0.9
     assert all(limit["share"] <= 1.0 for limit in content["limits"].values())
-    assert any("the friction that was given" in note for note in content["notes"])
+    assert any("with the friction given" in note for note in content["notes"])
     for name in ("trajectory.csv", "trajectory-b.csv"):
         table = pl.read_csv(tmp_path / "a" / name)
         assert np.allclose(table[0, "joint1.position"], 1.0) and np.allclose(table[-1, "joint2.position"], -0.5)

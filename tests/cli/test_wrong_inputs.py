@@ -29,7 +29,7 @@ RECORDINGS = [
     ("text_1.csv", 1, ("text_1.csv: column 'joint1.position', row 2", "is not a number", "correct it")),
     ("numbers_1.csv", 1, ("numbers_1.csv: the first line holds numbers", "put the column names there")),
     ("long_1.csv", 1, ("long_1.csv: row 1 has 6 values for 5 columns", "correct or remove")),
-    ("twice_1.csv", 1, ("twice_1.csv: column 'joint1.effort' stands in the header twice", "rename one")),
+    ("twice_1.csv", 1, ("twice_1.csv: column 'joint1.effort' is in the header twice", "rename one")),
     ("no_text_1.csv", 1, ("no_text_1.csv: not a text file in UTF-8, UTF-16 or Windows-1252", "save the CSV again")),
     ("cut_1.parquet", 1, ("cut_1.parquet: not a whole parquet file", "copy or record it again")),
     ("log.txt", 1, ("log.txt: suffix '.txt' is not known", ".parquet, .csv")),
@@ -37,7 +37,7 @@ RECORDINGS = [
     ("garbage.mat", 1, ("garbage.mat: not a whole mat file", "copy or record it again")),
     ("other_1.csv", 1, ("other_1.csv: no column 'joint2.position'", "elbow.position", "rename the column")),
     ("dumb_1.csv", 1, ("dumb_1.csv: no column 'joint2.effort'", "rename the column")),
-    ("still_1.parquet", 1, ("still_1.parquet: nothing is left", "at rest", "moving data")),
+    ("still_1.parquet", 1, ("still_1.parquet: none of 100 samples can be used", "at rest", "moving data")),
     ("dead_1.parquet", 1, ("dead_1.parquet: joint1.effort is 0 throughout", "dead channel", "record it again")),
     ("nan_1.parquet", 1, ("nan_1.parquet: joint1.position", "NaN", "record that channel")),
     ("degrees_1.parquet", 1, ("degrees_1.parquet: joint1.position", "looks like degrees", "convert it to rad")),
@@ -74,7 +74,7 @@ ROBOTS = [
         1,
         ("loop.urdf: not a usable URDF: joint 'joint2': link 'link1' is its parent and its child", "name two"),
     ),
-    ("roots.urdf", 1, ("roots.urdf: not a usable URDF: links 'base_link', 'lonely' hang on no joint",)),
+    ("roots.urdf", 1, ("roots.urdf: not a usable URDF: links 'base_link', 'lonely' have no joint to a parent",)),
 ]
 OTHERS = [
     # identify

@@ -63,5 +63,5 @@ def test_every_witness_is_heard():
     line = StandingLine(0, 5.0, 0.1, 0.9, True, 0.0)
     first, second = weighed_evidence(outcome, held_out, (), (line, None), CRITERIA)
     assert not first.shown
-    assert "a line of 0.1 N m at 5 Hz" in first.why
+    assert "a spectral line of 0.1 N m at 5 Hz" in first.why
     assert second.shown

@@ -91,7 +91,7 @@ def test_the_joint_named_for_a_wrong_scale_depends_on_no_unit_of_length(tmp_path
         result = diagnose(robot, runs, bands=[8.0] * 3, catalogue=effects_named("torque_gain_mismatch"))
         (effect,) = result.effects
         found.append(effect.parameters["ratio"])
-        assert effect.joint == "j3" and effect.description.endswith("it is not known which one's is wrong")
+        assert effect.joint == "j3" and effect.description.endswith("it is not known which scale is wrong")
     for ratio in found:
         assert ratio.value == pytest.approx(1.2, abs=4.0 * ratio.std)
         assert (ratio.value, ratio.std) == (

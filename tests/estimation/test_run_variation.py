@@ -63,7 +63,7 @@ def test_how_far_runs_differ_is_found():
         *each, late = plain
         assert all(said.startswith(f"joint{j} differs from run to run") for j, said in enumerate(each, 1))
         assert late.startswith(
-            "effort comes late by another time in each run, on all joints alike (standard deviation "
+            "effort is late on all joints alike, by a different time in each run (standard deviation "
         )
         assert doubted == [each[0] + "; the unexplained part may cause this", each[1], late]
         # The runs' delays are about zero, so that their spread is their size.
@@ -116,7 +116,7 @@ def test_a_delay_that_all_runs_have_alike_is_no_difference():
     variation = wls(observed(late)).variation
     assert variation is not None
     said, *others = variation.sentences(ROBOT)
-    assert said.startswith("joint1 lags by 7.") and said.endswith(" ms in all runs alike")
+    assert said.startswith("joint1 lags by 7.") and said.endswith(" ms in all runs")
     assert not any("delay" in item for item in others)
 
 
@@ -130,7 +130,7 @@ def test_a_delay_alike_is_reported_of_enough_runs(count: int, told: bool):
     assert late_alike(item) == (pytest.approx(0.012) if told else 0.0)
     (said,) = RunVariation((item, None)).sentences(ROBOT)
     assert said == (
-        "joint1 lags by 12 ms in " + ("all runs alike" if told else "3 runs, which are too few to determine a delay")
+        "joint1 lags by 12 ms in " + ("all runs" if told else "3 runs, which are too few to determine a delay")
     )
 
 
@@ -153,7 +153,7 @@ def test_pieces_of_one_recording_do_not_differ_by_a_delay():
     ]
     variation = wls(observed(made)).variation
     assert variation is not None and variation.delays is not None and not variation.delays.differ
-    assert not any("its delay" in item or "comes late" in item for item in variation.sentences(ROBOT))
+    assert not any("its delay" in item or "is late on" in item for item in variation.sentences(ROBOT))
 
 
 @pytest.mark.parametrize("apart", [0.0, 0.3])
@@ -195,7 +195,7 @@ def test_what_one_joint_shows_alone_is_not_called_a_delay(lacking: str):
     variation = wls(observed(made)).variation
     assert variation is not None
     said = variation.sentences(ROBOT)
-    assert not any("its delay" in item or "comes late" in item for item in said)
+    assert not any("its delay" in item or "is late on" in item for item in said)
     assert any(
         item.startswith("joint1") and "looks like a delay, which the joints do not share" in item for item in said
     )

@@ -49,13 +49,13 @@ def test_parameters_that_no_motion_tells_apart_are_said():
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        ({"tool_acceleration": 1e-4}, r"tightest is the tool acceleration limit of 0\.0001 m/s\^2"),
-        ({"accelerations": {"joint2": 1e-4}}, r"tightest is the acceleration limit of joint2, 0\.0001 rad/s\^2"),
-        ({"torques": {"joint1": 0.2101}}, r"tightest is the torque limit of joint1, 0\.0001 N m"),
+        ({"tool_acceleration": 1e-4}, r"tightest limit is the tool acceleration limit of 0\.0001 m/s\^2"),
+        ({"accelerations": {"joint2": 1e-4}}, r"tightest limit is the acceleration limit of joint2, 0\.0001 rad/s\^2"),
+        ({"torques": {"joint1": 0.2101}}, r"tightest limit is the torque limit of joint1, 0\.0001 N m"),
     ],
 )
 def test_limits_too_tight_for_any_motion_are_named(given, said):
-    with pytest.raises(InfeasibleLimits, match=f"no motion within the limits shows all parameters; the {said}"):
+    with pytest.raises(InfeasibleLimits, match=f"no motion within the limits determines all parameters; the {said}"):
         design_excitation(COMPLETE, **SHORT, limits=limits_of(SCARA, share=1.0, **given), effort=QUICK)
 
 

@@ -50,7 +50,7 @@ def test_the_motion_keeps_its_limits_and_is_said_to_tell(asked):
     # More of the same small motion would not.
     same = expected_answers(asked[0], [part.motion for part in open_diagnosis().search.data.stretches[:1]])
     assert same[0].after < 2.0 * same[0].before + 0.1
-    assert not same[0].settled and same[0].instead.startswith(f"Would not tell: {PAIR}. What would: ")
+    assert not same[0].settled and same[0].instead.startswith(f"This motion does not settle: {PAIR}. To settle it: ")
 
 
 @pytest.mark.slow
@@ -126,7 +126,7 @@ def test_a_slow_motion_is_slow_where_the_limit_is_out_of_reach_too():
 @pytest.mark.slow
 def test_goals_that_exclude_each_other_are_said(asked):
     model = asked[0].scene.model
-    with pytest.raises(UsageError, match="without a criterion of its own"):
+    with pytest.raises(UsageError, match="takes no criterion"):
         design_excitation(model, tell=asked[0], trajectories=2)
     with pytest.raises(ScaraIdentError, match="left no question"):
         design_excitation(model, tell=inquire(open_diagnosis(), []))

@@ -70,7 +70,9 @@ def test_what_raises_hands_on_its_exception_and_what_follows_is_done(cluster, tm
 def test_work_on_which_all_workers_die_says_what_to_look_at(monkeypatch):
     # Each that stands in for a dead one takes a second to begin.
     monkeypatch.setattr(module, "MAX_DEATHS", 1)
-    with pytest.raises(ProcessEnded, match=r"2 workers died on it, as on a file that is damaged .* names such a file"):
+    with pytest.raises(
+        ProcessEnded, match=r"2 workers died on it, for example because a file is damaged .* names such a file"
+    ):
         run_all(die, [()], workers=1)
 
 

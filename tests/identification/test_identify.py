@@ -293,7 +293,7 @@ def test_a_recording_cannot_be_fitted_and_held_out(robot: Robot, clean: Recordin
 
 
 def test_options_are_those_of_consistent(robot: Robot, clean: Recording):
-    with pytest.raises(UsageError, match="options: those of the method consistent; 'ols' takes none"):
+    with pytest.raises(UsageError, match="options: these belong to the method consistent; 'ols' has no options"):
         identify(robot, [clean], method="ols", options=ConsistentOptions())
     with pytest.raises(ArgumentError, match="options: expected ConsistentOptions; found dict"):
         identify(robot, [clean], method="consistent", options={"friction": "free"})
@@ -342,6 +342,6 @@ def test_what_steers_a_consistent_fit_is_reported_beside_least_squares(robot: Ro
 
     def told(method: str) -> list[str]:
         notes = identify(ur5, training, bands=[10.0] * 6, method=method).notes
-        return [note for note in notes if note.startswith("a fit that bounds")]
+        return [note for note in notes if note.startswith("a robust fit")]
 
     assert told("consistent") == told("wls")

@@ -46,7 +46,7 @@ def useless(robot: Robot) -> dict[str, Recording]:
         "no effort was recorded": replace(whole, effort=None),
         "no four samples in a row": cut(whole, slice(0, 3)),
         "0 independent rows remain": replace(whole, position=still + noise),
-        "independent rows remain once the ends": cut(whole, part),
+        "independent rows remain without the ends": cut(whole, part),
     }
 
 
@@ -59,7 +59,7 @@ KINDS = (
     "no effort was recorded",
     "no four samples in a row",
     "0 independent rows remain",
-    "independent rows remain once the ends",
+    "independent rows remain without the ends",
 )
 
 

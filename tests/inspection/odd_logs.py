@@ -299,7 +299,7 @@ LOGS = (
     Log("texts and constants beside", parquet(NAMED | {"mode": ["run"] * SAMPLES, "torque_limit": np.full(SAMPLES, 9.0)})),
     Log("numbers as texts", parquet({name: [f"{value:.17g}" for value in values] for name, values in MADE.items()})),
     Log("encoder counts", parquet(MADE | {f"{j}.position": np.rint(1e4 * MADE[f"{j}.position"]) for j in ARM}), refused="state position: counts_per_turn"),
-    Log("no efforts at all", parquet(without(MADE, "effort")), note="cannot be identified from"),
+    Log("no efforts at all", parquet(without(MADE, "effort")), note="cannot be used to identify"),
     Log("a dead effort within the arm", parquet(MADE | {"j2.effort": np.zeros(SAMPLES)}), refused="identify without j2"),
     Log("constant efforts", parquet(MADE | {f"{j}.effort": np.zeros(SAMPLES) for j in ARM} | {f"{j}.position": np.zeros(SAMPLES) for j in ARM}), refused="record the efforts"),
     # Arms.

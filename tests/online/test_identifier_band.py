@@ -233,7 +233,7 @@ def test_a_band_too_wide_for_the_encoder_is_said_once_and_a_narrower_that_does(
     # Shares change as more is known.
     (note,), (_,) = caplog.messages, online.notes
     assert note.startswith("in a band of 20 Hz the noise of positions makes ")
-    narrower = float(note.partition("; a band of ")[2].partition(" Hz")[0])
+    narrower = float(note.partition("; use a band of ")[2].partition(" Hz")[0])
     assert 2.0 < narrower < 20.0
     # Not again, neither by going on nor after a restart.
     online.save(tmp_path / "state.npz")

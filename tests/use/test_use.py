@@ -70,5 +70,5 @@ def test_a_joint_that_did_not_move_is_named() -> None:
 def test_a_model_that_the_virtual_arm_has_not_is_refused_in_one_line() -> None:
     model = with_spring()
     mine = TorqueModel("mine", model.robot, model.model.terms)
-    with pytest.raises(UsageError, match="none that the virtual arm has"):
+    with pytest.raises(UsageError, match="the virtual arm does not have its model"):
         use(replace(model, model=mine))

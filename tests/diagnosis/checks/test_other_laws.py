@@ -125,7 +125,7 @@ def test_a_loss_is_by_the_law_that_explains_more_and_leaves_no_scale_of_the_torq
     assert [item.effect for item in found.search.chosen] == [TransmissionLoss(told)]
     (effect,) = found.effects
     assert ("loss_order" in effect.parameters) == (told == 1)
-    assert ("as large where it is driven" in effect.description) == (told == 1)
+    assert ("with the same loss whether" in effect.description) == (told == 1)
     loss = effect.parameters["loss_coefficient"]
     assert loss.value == pytest.approx(size, abs=3.0 * loss.std)
     assert loss.std < 0.1 * size

@@ -166,7 +166,7 @@ def test_what_surely_repeats_is_no_noise_however_small_beside_it(nothing_missing
     residuals = nothing_missing.training_after.residuals(nothing_missing.after.value)
     found = evidence(nothing_missing.search, residuals, fit, (0.0057, 0.0057), (0.0, 0.0))
     assert [item.shown for item in found] == [shown, shown]
-    said = "0.009 N m repeats from run to run (p = 1.3e-14) beside 0.0103 N m that does not: more than filters"
+    said = "0.009 N m repeats from run to run (p = 1.3e-14), 0.0103 N m does not; this is more than filters"
     assert found[0].why.startswith(said) != shown
     # Twenty times the noise was "too little to tell what it is".
     assert found[0].why.endswith("and no effect that was tried explains it") != shown

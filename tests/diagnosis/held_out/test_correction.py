@@ -57,7 +57,7 @@ def test_delays_of_recordings_are_found_and_corrected_each_by_its_own(scale: flo
     found = result(scale).search.correction
     assert found is not None
     assert found.of_each
-    (said,) = [note for note in result(scale).notes if "by another time in each recording: delay " in note]
+    (said,) = [note for note in result(scale).notes if "with a different delay in each recording: delay " in note]
     told = re.findall(r"delay_R(\d)_1 (\S+) \+- (\S+) s", said)
     assert [int(place) for place, _, _ in told] == list(range(len(LATE)))
     value, std = np.array([[float(x) for x in each[1:]] for each in told]).T
@@ -94,7 +94,7 @@ def test_with_all_delays_corrected_what_is_left_of_held_out_recordings_is_noise(
 
 def test_that_they_differ_is_said_and_is_no_effect_of_the_arm():
     notes = result(0.0).notes
-    (said,) = [note for note in notes if "by another time in each recording" in note]
+    (said,) = [note for note in notes if "with a different delay in each recording" in note]
     assert "delay_R2_1 0.01" in said
     assert "corrected in the data" in said or result(0.0).effects
-    assert not any("comes late" in note or "looks like a delay" in note for note in notes)
+    assert not any("is late on" in note or "looks like a delay" in note for note in notes)

@@ -83,7 +83,10 @@ def test_an_effect_that_is_there_in_both_removes_most_of_what_is_held_out(effect
     # The delay that is found is of small delays.
     assert item.held_out.size == pytest.approx(1.0, abs=0.15)
     said = repr(_effect_words(item, DiagnosisContext(result))[0])
-    assert f"no choice has seen, it removes {item.held_out.share:.0%}; {words_of(item.held_out, 'N m')}." in said
+    assert (
+        f"which no choice has used, it removes {item.held_out.share:.0%} of the squared residual; {words_of(item.held_out, 'N m')}."
+        in said
+    )
     summary = diagnosis_dict(result)["summary"]
     (line,) = [line for line in summary if line.startswith(f"Found {item.effect}")]
     assert line.endswith(f"; {shown_of(item.held_out)} on the held-out recordings.")
@@ -204,11 +207,11 @@ def test_one_that_is_not_there_in_what_is_held_out_is_in_doubt():
     words = words_of(gain, "N m")
     assert (
         content["summary"][place + 1]
-        == f"Not borne out by the held-out recordings: {words}; record more motions to fit."
+        == f"Not supported by the held-out recordings: {words}; record more motions to fit."
     )
     assert [item["held_out"] for item in content["effects"]] == [gain.entry()]
     said = repr(_effect_words(result.effects[0], DiagnosisContext(result))[0])
-    assert f"It is not borne out by the held-out recordings: {words}." in said
+    assert f"It is not supported by the held-out recordings: {words}." in said
 
 
 def test_it_is_not_what_the_model_lacked():

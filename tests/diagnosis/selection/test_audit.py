@@ -142,7 +142,7 @@ def test_of_those_that_act_together_one_whose_size_is_not_determined_falls(monke
     monkeypatch.setattr(audit, "physical_parameters", unsure)
     (fallen,) = unsettled(found, found.step.weights)
     assert fallen.label == found.chosen[place].label(found.scene)
-    assert fallen.why.startswith("its size is within its uncertainty beside those that it acts with")
+    assert fallen.why.startswith("its size is within its uncertainty beside the effects that it acts with")
     # One alone is believed, with a size that is not told.
     alone = searched(with_torque(exact_runs(), 1, lambda motion: 0.3 * motion.q[1]), SpringTogether())
     place = 0
@@ -172,7 +172,7 @@ def test_an_effect_that_the_noise_of_positions_moves_by_as_much_falls(
 
     monkeypatch.setattr(audit, "physical_parameters", with_bias)
     refused = unsettled(found, found.step.weights)
-    why = "the noise of the positions moves its size by as much once its other parameters are free"
+    why = "the noise of the positions changes its size by as much when its other parameters are free"
     assert [item.why.split(":")[0] for item in refused] == ([] if stands else [why])
 
 
@@ -257,7 +257,7 @@ def test_a_ripple_of_too_few_periods_is_reported_and_not_believed():
     made = with_torque(exact_runs(), 0, lambda motion: 0.3 * np.sin(motion.q[0] - 1.57))
     result = diagnose(robot, made, bands=BANDS, catalogue=(Spring(), TorqueRipple()))
     assert result.effects == () and result.verdict == "unexplained"
-    assert [item.joint for item in result.evidence if "hold too little of it" in item.why] == ["joint1"]
+    assert [item.joint for item in result.evidence if "excite it too little" in item.why] == ["joint1"]
     told = {item.effect: item.why for item in result.tentative}
     assert set(told) == {"torque_ripple", "spring"}
     assert told["spring"].startswith("a torque ripple of 1 period per motor turn, of which")
