@@ -181,7 +181,7 @@ def main() -> None:
                         f"; {item.value:.5g} +- {item.std:.2g} ({item.value / true - 1.0:.1%})"
                         for item in own[0].direct.values()
                     )
-                others += "".join(f"; {note}" for note in found.notes if "channel of its own" in note)
+                others += "".join(f"; {note}" for note in found.notes if "a separate channel" in note)
                 print(line + ("" if own else f"{'-':>24}{'-':>8}{'-':>9}{'-':>9}{'-':>7}") + f"  {others}", flush=True)
 
 
