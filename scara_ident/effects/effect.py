@@ -80,6 +80,8 @@ class Effect(ABC):
         Whether each recording of the scene has a coefficient of its own, of which no other recording says anything.
     same_at_all_frequencies : bool
         Whether its coefficient is the same in any part of the band, so that another one there says that it is not it.
+    after_correction : bool
+        Whether it is tried, and named if found, only where a correction `leaves` it, and needs no member; else what that leaves is never named.
     in_small_ways : bool
         Whether it is determined by small differences of positions, as setpoints do from what a controller makes of them.
     of_state : bool
@@ -116,6 +118,7 @@ class Effect(ABC):
     in_intervals: ClassVar[bool] = False
     of_each_recording: ClassVar[bool] = False
     same_at_all_frequencies: ClassVar[bool] = False
+    after_correction: ClassVar[bool] = False
     in_small_ways: ClassVar[bool] = False
     of_state: ClassVar[bool] = False
     smooth: ClassVar[bool] = False
@@ -206,11 +209,8 @@ class Effect(ABC):
         found: dict[str, Any] = {"joint": "all joints"}
         found |= {item.name: value for item, value in zip(self.nonlinear, member.nonlinear, strict=True)}
         if member.joint is not None:
-            found |= {
-                "joint": robot.joints[member.joint],
-                "torque": robot.torque_unit(member.joint),
-                "position": robot.position_unit(member.joint),
-            }
+            j = member.joint
+            found |= {"joint": robot.joints[j], "torque": robot.torque_unit(j), "position": robot.position_unit(j)}
             if member.partner is not None:
                 found["partner"] = robot.joints[member.partner]
         return found
@@ -395,5 +395,5 @@ class Effect(ABC):
         return ()
 
     def leaves(self, scene: Scene, member: Member, value: Array) -> tuple[Effect, Member, float] | None:
-        """Return what may be left of it in corrected recordings and is no part of an arm, and the band, Hz, that holds that."""
+        """Return what may be left of it in corrected recordings, and the band, Hz, beyond which that hides what the arm does."""
         return None
