@@ -35,7 +35,7 @@ class TorqueFilter(Effect):
 
     name: ClassVar[str] = "torque_filter"
     units: ClassVar[dict[str, str]] = {"time_constant": "s"}
-    bounds: ClassVar[dict[str, tuple[float, float]]] = {"time_constant": (1e-6, 1.0)}
+    bounds: ClassVar[dict[str, tuple[float, float]]] = {"time_constant": (0.0, 1.0)}
     whole_arm = "always"
     time_constant: float = 0.01
 
