@@ -9,15 +9,13 @@ from functools import cache
 import numpy as np
 
 from scara_ident.diagnosis.candidates.candidates import Candidate
-from scara_ident.diagnosis.checks.same_errors import same
+from scara_ident.diagnosis.checks.same_errors import ROUNDING, same
 from scara_ident.diagnosis.selection.choice import fitted_beside, fitted_with, objection
 from scara_ident.diagnosis.testing.acceptance import Decision
 from scara_ident.diagnosis.testing.candidate_tests import held_out_gains
 from scara_ident.diagnosis.testing.selection_step import SelectionStep, best_of_each
 from scara_ident.effects import Scene
 
-# Of what the effect removes, less than this share more or less is rounding: two models of one span leave the same.
-ROUNDING = 1e-9
 # Columns that follow the base model's estimate instead of the last one gain at least this share of what they would.
 MIN_PRELIMINARY_SHARE = 0.5
 
