@@ -67,14 +67,16 @@ class HeldOutGain:
     def against(self, criteria: SelectionCriteria = CRITERIA) -> bool:
         """Whether the recordings held out speak against it: it stands for another effect, or none is likelier.
 
-        It stands for another where it is surely smaller than it was found and removes less than half of what its size promises.
-        That it is surely smaller is not enough: laws are no more than near, and of an effect that is there 99.0 +- 0.3 % may show.
+        It stands for another where it surely has another size there, and is more than twice as large or removes less than half of what
+        its size promises. That the size is another is not enough: laws are no more than near, and of an effect that is there 99.0 +- 0.3 % may show.
         None is likelier where the size seen is that much nearer to 0 than to 1 (`MIN_LIKELIHOOD_RATIO`), however unsure either is.
         """
-        removed = 2.0 * self.size - 1.0
-        smaller = removed < criteria.min_of_repeatable and 1.0 - self.size > criteria.min_final_size * self.std
+        removed, least = 2.0 * self.size - 1.0, criteria.min_of_repeatable
+        another = (removed < least or least * self.size > 1.0) and (
+            abs(1.0 - self.size) > criteria.min_final_size * self.std
+        )
         # The logarithm of the ratio of normal likelihoods of sizes 0 and 1.
-        return smaller or 0.5 - self.size > np.log(MIN_LIKELIHOOD_RATIO) * self.std**2
+        return another or 0.5 - self.size > np.log(MIN_LIKELIHOOD_RATIO) * self.std**2
 
     def borne_out(self, criteria: SelectionCriteria = CRITERIA) -> bool:
         """Whether it surely shows there, and makes the error smaller by what it should."""
