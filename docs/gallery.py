@@ -97,6 +97,7 @@ CASES = {
     "smooth_coulomb": Case("smooth_coulomb:elbow_joint", UPPER_ARM),
     "backlash": Case("backlash:joint1:width=0.004"),
     "time_delay": Case("time_delay:delay=0.012"),
+    "torque_filter": Case("torque_filter:time_constant=0.02", rate=500.0),
     "joint_zero": Case("joint_zero:shoulder_lift_joint:offset=0.3", UPPER_ARM),
     "joint_elasticity": Case("joint_elasticity:joint1:stiffness=2500"),
     "coupled_shaft": Case("coupled_shaft", WRIST),
@@ -276,14 +277,18 @@ def draw(path: Path, told: Figure) -> None:
 
 def stand_ins(robot: Robot, runs: Sequence[Recording], name: str, effect: FoundEffect) -> str:
     """Say what is found in the place of an effect when it is not tried."""
-    others = [family for family in CATALOGUE if family.name != name]
-    found = diagnose(robot, runs, catalogue=others)
-    labels = [f"`{item.effect}`" + (f" of {item.joint}" if item.joint else "") for item in found.effects]
+    found = diagnose(robot, runs, catalogue=[family for family in CATALOGUE if family.name != name])
+    # The rest of a correction exists only together with the correction.
+    needed = [item.effect for item in found.effects if _only(item.effect).corrects_data(Member(None))]
+    needed = needed if _only(name).after_correction else []
+    others = [item for item in found.effects if item.effect not in needed]
+    labels = [f"`{item.effect}`" + (f" of {item.joint}" if item.joint else "") for item in others]
     if not labels:
+        beside = f" beside `{needed[0]}`" if needed else ""
         missed = f": it is missed, though it removes {_removed(effect)}" if found.verdict == "complete" else ""
         noted = [note for note in found.notes if " lags by " in note] if missed else []
         return (
-            f"**Taken for:** nothing; the verdict is then `{found.verdict}`{missed}"
+            f"**Taken for:** nothing{beside}; the verdict is then `{found.verdict}`{missed}"
             + (f". A note says: {'; '.join(noted)}" if noted else "")
             + "."
         )

@@ -164,9 +164,14 @@ def _within(band: float, found: Search) -> float:
 
 
 def _corrected_band(found: Search) -> float:
-    """Return the band, Hz, above which the rest of a correction hides effects of the arm; infinite without a correction."""
+    """Return the band, Hz, above which the rest of a correction hides effects of the arm; infinite without a correction.
+
+    A rest that is tried as an effect counts only if it was found.
+    """
     left = None if found.correction is None else found.correction.left(found.scene)
-    return np.inf if left is None else left[1]
+    if left is None or (left[0].effect.after_correction and left[0].label(found.scene) not in _labels(found)):
+        return np.inf
+    return left[1]
 
 
 def _new(found: Search, before: Search) -> bool:

@@ -23,6 +23,7 @@ from scara_ident.effects.recording_delays import DelayOfEachRecording
 from scara_ident.effects.shaft import CoupledShaft
 from scara_ident.effects.smooth_coulomb import SmoothCoulomb
 from scara_ident.effects.tilt import BaseTilt, NominalBaseTilt
+from scara_ident.effects.torque_filter import TorqueFilter
 from scara_ident.errors import ArgumentError
 from scara_ident.registry import Registry
 
@@ -56,6 +57,7 @@ CATALOGUE: tuple[Effect, ...] = (
     TorqueGainMismatch(),
     TimeDelay(),
     DelayOfEachRecording(),
+    TorqueFilter(),
     JointZero(),
     JointElasticity(),
     Backlash(),

@@ -80,6 +80,8 @@ class Effect(ABC):
         Whether each recording of the scene has its own coefficient, about which other recordings contain no information.
     same_at_all_frequencies : bool
         Whether its coefficient is the same in any part of the band; if it differs there, it is another effect.
+    after_correction : bool
+        Whether it is tried, and named if found, only after a correction that `leaves` it; other rests are never named.
     in_small_ways : bool
         Whether it is determined by small differences of positions, like those between setpoints and true positions.
     of_state : bool
@@ -116,6 +118,7 @@ class Effect(ABC):
     in_intervals: ClassVar[bool] = False
     of_each_recording: ClassVar[bool] = False
     same_at_all_frequencies: ClassVar[bool] = False
+    after_correction: ClassVar[bool] = False
     in_small_ways: ClassVar[bool] = False
     of_state: ClassVar[bool] = False
     smooth: ClassVar[bool] = False
@@ -206,11 +209,8 @@ class Effect(ABC):
         found: dict[str, Any] = {"joint": "all joints"}
         found |= {item.name: value for item, value in zip(self.nonlinear, member.nonlinear, strict=True)}
         if member.joint is not None:
-            found |= {
-                "joint": robot.joints[member.joint],
-                "torque": robot.torque_unit(member.joint),
-                "position": robot.position_unit(member.joint),
-            }
+            j = member.joint
+            found |= {"joint": robot.joints[j], "torque": robot.torque_unit(j), "position": robot.position_unit(j)}
             if member.partner is not None:
                 found["partner"] = robot.joints[member.partner]
         return found
@@ -395,5 +395,5 @@ class Effect(ABC):
         return ()
 
     def leaves(self, scene: Scene, member: Member, value: Array) -> tuple[Effect, Member, float] | None:
-        """Return what may be left of it in corrected recordings, no property of the arm, and the band, Hz, that contains it."""
+        """Return what may be left of it in corrected recordings, and the band, Hz, above which this hides effects of the arm."""
         return None

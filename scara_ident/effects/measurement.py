@@ -17,9 +17,11 @@ from scara_ident.effects.parameters import Coefficient, Member, Parameter, View,
 from scara_ident.effects.position_filter import FILTERED, PositionFilter
 from scara_ident.effects.scale_groups import scale_groups
 from scara_ident.effects.signals import Scene, Signals
+from scara_ident.effects.torque_filter import TorqueFilter
 from scara_ident.motion.low_pass import differentiate
 from scara_ident.motion.motion import UNIFORM_TOLERANCE
 from scara_ident.motion.spline import cubic_spline
+from scara_ident.motion.transfer import through
 from scara_ident.recording.audit.samples import GAP_STEPS
 from scara_ident.recording.recording import Recording
 
@@ -287,10 +289,12 @@ class TimeDelay(Effect):
         return tuple((LateTurn(), Member(joint)) for joint in self.rows(scene, member))
 
     def leaves(self, scene: Scene, member: Member, value: Array) -> tuple[Effect, Member, float] | None:
-        """Return the rest of a filter of the positions where these are the later ones by more than a sample."""
-        if value[0] >= 0.0 or self.negligible(scene, member, value):
+        """Return the rest of a filter of positions or efforts, whichever is later, if it is late by more than a sample."""
+        if self.negligible(scene, member, value):
             return None
-        return PositionFilter(), Member(None), FILTERED / -float(value[0])
+        delay = float(value[0])
+        left = TorqueFilter(delay) if delay > 0.0 else PositionFilter()
+        return left, Member(None), FILTERED / abs(delay)
 
 
 class LateTurn(Effect):
@@ -352,18 +356,5 @@ def shifted(recording: Recording, delay: float, joints: Sequence[int] | None = N
 
 def _advanced(signal: Array, steps: float) -> Array:
     """Return a uniform signal ``steps`` samples earlier, shape (k, N)."""
-    count = signal.shape[1]
-    reach = min(count - 1, int(np.ceil(abs(steps))) + 64)
-    head = 2.0 * signal[:, :1] - signal[:, reach:0:-1]
-    tail = 2.0 * signal[:, -1:] - signal[:, -2 : -reach - 2 : -1]
-    extended = np.concatenate([head, signal, tail], axis=1)
-    length = extended.shape[1]
-    # Without its chord the continued signal closes on itself; the chord is shifted as the line that it is.
-    slope = (extended[:, -1:] - extended[:, :1]) / (length - 1)
-    ramp = extended[:, :1] + slope * np.arange(length)
-    spectrum = np.fft.rfft(extended - ramp, axis=1)
-    phase = np.exp(2j * np.pi * np.fft.rfftfreq(length) * steps)
-    if length % 2 == 0:
-        phase[-1] = phase[-1].real
-    moved = np.fft.irfft(spectrum * phase, length, axis=1) + ramp + slope * steps
-    return np.asarray(moved[:, reach : reach + count])
+    moved, chord, slope = through(signal, lambda omega: np.exp(1j * omega * steps), int(np.ceil(abs(steps))) + 64)
+    return moved + chord + slope * steps

@@ -15,7 +15,7 @@ from scara_ident.motion.low_pass import differentiate
 
 # Of positions that are late by T seconds, motion up to this over T, Hz, is known where a filter makes them late: a mean over 2 T or a lag
 # of first order leaves 86 or 73 % of it, and the derivatives of `PositionFilter` all of the torque but 0.2 or 2 %. Of a fifth over T they leave 1
-# and 10 %, for which gears of single joints may stand.
+# and 10 %, for which gears of single joints may stand. If efforts are late by T, a filter hides effects of the arm in the same way.
 FILTERED = 0.15
 
 

@@ -101,8 +101,9 @@ class DelayOfEachRecording(TimeDelay):
         return ()
 
     def leaves(self, scene: Scene, member: Member, value: Array) -> tuple[Effect, Member, float] | None:
-        """Return the rest of a filter of the positions where these are late in all recordings: a filter is, clocks are by chance."""
-        return super().leaves(scene, member, np.mean(value, keepdims=True)) if np.all(value < 0.0) else None
+        """Return the rest of a filter if positions, or efforts, are late in all recordings; clocks are late in some by chance."""
+        alike = np.all(value < 0.0) or np.all(value > 0.0)
+        return super().leaves(scene, member, np.mean(value, keepdims=True)) if alike else None
 
     def or_else(self, scene: Scene, member: Member, value: Array) -> str:
         """Say so where they do not differ, and which of both is late where the mean is negative."""

@@ -110,6 +110,8 @@ class PlantDraft:
         Fields of `Sensors`.
     delay : ndarray, shape (n,)
         Time by which the recorded effort lags, s.
+    lag : ndarray, shape (n,)
+        Time constant of a first-order filter of the recorded effort, s.
     gain : ndarray, shape (n,)
         Recorded per true torque.
     cubic : ndarray, shape (n,)
@@ -132,6 +134,7 @@ class PlantDraft:
     arrays: dict[str, Array]
     sensors: dict[str, Array]
     delay: Array
+    lag: Array
     gain: Array
     cubic: Array
     square: Array
@@ -211,6 +214,7 @@ def empty_draft(n: int, scale: Array, reduction: Array) -> PlantDraft:
         arrays=arrays,
         sensors=sensors,
         delay=zero.copy(),
+        lag=zero.copy(),
         gain=np.ones(n),
         cubic=zero.copy(),
         square=zero.copy(),

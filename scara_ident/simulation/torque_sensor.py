@@ -1,4 +1,4 @@
-"""How the torque of the drives is measured: delayed, averaged, bent, shifted."""
+"""How the torque of the drives is measured: filtered, delayed, averaged, bent, shifted."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ def recorded_effort(
     ticks = np.arange(samples + 1.0)
     recorded = np.empty((n, samples))
     for i in range(n):
-        u = effort[i]
         row = order[i]
+        u = _filtered(effort[i], draft.lag[row], period)
         # The torque is constant between ticks, so its integral is linear there and the mean is exact.
         integral = np.concatenate([[0.0], np.cumsum(u)])
         middle = ticks[:-1] - draft.delay[row] / period
@@ -51,3 +51,15 @@ def recorded_effort(
         u = u + draft.square[row] * u**2 + draft.cubic[row] * u**3
         recorded[i] = draft.gain[row] * u + draft.shift[row] + draft.drift[row] * ticks[:-1] * period
     return recorded
+
+
+def _filtered(effort: Array, time_constant: float, period: float) -> Array:
+    """Return the mean over each period of a torque after a first-order filter; the torque is constant in each period, and the filter starts at rest."""
+    if time_constant == 0.0:
+        return effort
+    from scipy.signal import lfilter
+
+    kept = np.exp(-period / time_constant)
+    # Torque minus the filter's output at each tick: it decays, and every step of the torque adds to it.
+    lacking = lfilter([1.0], [1.0, -kept], np.diff(effort, prepend=effort[:1]))
+    return np.asarray(effort - lacking * (1.0 - kept) * time_constant / period)

@@ -16,6 +16,7 @@ from scara_ident.diagnosis.evidence.outcome import Outcome, outcome_of
 from scara_ident.diagnosis.model_selection import (
     _asked_band,
     _band_beyond,
+    _corrected_band,
     _promised_band,
     below_position_noise,
     select_model,
@@ -220,3 +221,14 @@ def test_a_band_whose_further_effects_do_not_stand_is_given_up(left: str, told: 
     outcome = select_model(task, SimpleNamespace(data=narrow.data), free=True)
     assert outcome.search.bands == ((10.0,) if back else (50.0,))
     assert outcome.demoted == (("b", "b") if back else ("b",))
+
+
+@pytest.mark.parametrize(("tried", "there", "band"), [(False, False, 12.5), (True, False, np.inf), (True, True, 12.5)])
+def test_a_band_ends_where_what_a_correction_left_hides_the_arm(tried: bool, there: bool, band: float) -> None:
+    """In 65 Hz nothing of a lag of 12 ms was as it was in the 11 Hz where it was found: neither delay nor filter was told any more."""
+    rest = SimpleNamespace(effect=SimpleNamespace(after_correction=tried), label=lambda _: "rest")
+    correction = SimpleNamespace(left=lambda _: (rest, 12.5))
+    found = SimpleNamespace(correction=correction, scene=None, chosen=(rest,) if there else ())
+    assert _corrected_band(found) == band
+    found.correction = None
+    assert _corrected_band(found) == np.inf

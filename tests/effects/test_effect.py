@@ -50,6 +50,8 @@ def members(effect, scene):
         # Which, the torque of recordings would tell.
         own = Member(None, (0.1,) * len(effect.nonlinear))
         return (effect.in_recordings(scene, own, frozenset(["m"])),)
+    if effect.after_correction:
+        return (Member(None),)
     line = SpectralLine(effect.seeded_by or "order", 3.0)
     return effect.members(scene)[::5] or effect.seeds(scene, 0, line)
 

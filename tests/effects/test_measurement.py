@@ -17,6 +17,7 @@ from scara_ident.effects.measurement import (
     shifted,
 )
 from scara_ident.effects.position_filter import PositionFilter
+from scara_ident.effects.torque_filter import TorqueFilter
 from scara_ident.model.model import build_model
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import load_robot
@@ -255,10 +256,11 @@ def test_a_delay_below_nothing_says_that_the_position_is_the_later_one():
     assert "the position is later than the effort" in delay.or_else(scene, Member(None), np.array([-0.005]))
 
 
-def test_only_positions_that_are_late_by_more_than_a_sample_may_be_filtered():
+def test_only_what_is_late_by_more_than_a_sample_may_be_filtered():
     scene, delay = scene_of(load_robot(), rate=500.0), TimeDelay()
-    assert delay.leaves(scene, Member(None), np.array([0.02])) is None
+    assert delay.leaves(scene, Member(None), np.array([0.0015])) is None
     assert delay.leaves(scene, Member(None), np.array([-0.0015])) is None
+    assert delay.leaves(scene, Member(None), np.array([0.02])) == (TorqueFilter(0.02), Member(None), pytest.approx(7.5))
     found = delay.leaves(scene, Member(None), np.array([-0.02]))
     assert found == (PositionFilter(), Member(None), pytest.approx(7.5))
     assert PositionFilter().members(scene) == (Member(None),)

@@ -11,6 +11,7 @@ from numpy.testing import assert_allclose
 from scara_ident.effects import Member
 from scara_ident.effects.measurement import TimeDelay
 from scara_ident.effects.recording_delays import MAX_RECORDINGS, DelayOfEachRecording
+from scara_ident.effects.torque_filter import TorqueFilter
 from scara_ident.estimation.run_variation import MIN_RUNS
 from scara_ident.robot.robot import load_robot
 from tests.effects.scenes import columns, moving, scene_of
@@ -85,7 +86,7 @@ def test_what_is_asked_of_a_delay_is_asked_of_the_largest():
     assert EFFECT.leaves(here, ARM, large) is None
 
 
-def test_of_positions_that_are_late_in_all_recordings_the_rest_of_a_filter_may_be_left():
+def test_of_what_is_late_in_all_recordings_the_rest_of_a_filter_may_be_left():
     """A rigid Panda behind a lag of 18 ms had delays of each recording, and elastic gears of two joints for what the filter left."""
     here, late = replace(scene(), rate=500.0), np.array([-0.018, -0.0179, -0.0181])
     one, all_ = (
@@ -94,4 +95,7 @@ def test_of_positions_that_are_late_in_all_recordings_the_rest_of_a_filter_may_b
     assert one is not None and all_ is not None
     assert one[:2] == all_[:2] and one[2] == pytest.approx(all_[2])
     assert EFFECT.leaves(here, ARM, late + np.array([0.0, 0.02, 0.0])) is None
-    assert EFFECT.leaves(here, ARM, -late) is None
+    # A rigid UR5 whose torque lagged by 12 ms had delays of each recording too, 11.8 ms in all, and nothing was left of them.
+    filtered = EFFECT.leaves(here, ARM, -late)
+    assert filtered is not None
+    assert filtered[:2] == (TorqueFilter(pytest.approx(0.018)), ARM)

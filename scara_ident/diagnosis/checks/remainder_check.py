@@ -24,7 +24,7 @@ def remainder_objection(step: SelectionStep, decision: Decision) -> str | None:
     decision : Decision
         That lets it in.
     """
-    if step.rest is None or decision.candidate.corrects_data:
+    if step.rest in (None, decision.candidate) or decision.candidate.corrects_data:
         return None
     # Others in the model were fitted with the effect: what they took up of the rest shows once they are fitted without it, or with that.
     without = tune(step)

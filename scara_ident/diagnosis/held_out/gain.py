@@ -68,15 +68,17 @@ class HeldOutGain:
     def against(self, criteria: SelectionCriteria = CRITERIA) -> bool:
         """Whether the held-out recordings contradict it: it stands for another effect, or no effect is more likely.
 
-        It stands for another if it is certainly smaller than it was found and removes less than half of what its size
-        predicts. To be certainly smaller is not enough: laws are only approximations, and of a true effect 99.0 +- 0.3
-        % may show. No effect is more likely if the size seen is so much nearer to 0 than to 1 (`MIN_LIKELIHOOD_RATIO`),
-        with its uncertainty.
+        It stands for another if its size there certainly differs, and is more than twice as large or removes less than half
+        of what its size predicts. To differ certainly is not enough: laws are only approximations, and of a true effect
+        99.0 +- 0.3 % may show. No effect is more likely if the size seen is so much nearer to 0 than to 1
+        (`MIN_LIKELIHOOD_RATIO`), with its uncertainty.
         """
-        removed = 2.0 * self.size - 1.0
-        smaller = removed < criteria.min_of_repeatable and 1.0 - self.size > criteria.min_final_size * self.std
+        removed, least = 2.0 * self.size - 1.0, criteria.min_of_repeatable
+        another = (removed < least or least * self.size > 1.0) and (
+            abs(1.0 - self.size) > criteria.min_final_size * self.std
+        )
         # The logarithm of the ratio of normal likelihoods of sizes 0 and 1.
-        return smaller or 0.5 - self.size > np.log(MIN_LIKELIHOOD_RATIO) * self.std**2
+        return another or 0.5 - self.size > np.log(MIN_LIKELIHOOD_RATIO) * self.std**2
 
     def borne_out(self, criteria: SelectionCriteria = CRITERIA) -> bool:
         """Whether it surely shows there, and makes the error smaller by what it should."""

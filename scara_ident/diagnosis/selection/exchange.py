@@ -9,15 +9,13 @@ from functools import cache
 import numpy as np
 
 from scara_ident.diagnosis.candidates.candidates import Candidate
-from scara_ident.diagnosis.checks.same_errors import same
+from scara_ident.diagnosis.checks.same_errors import ROUNDING, same
 from scara_ident.diagnosis.selection.choice import fitted_beside, fitted_with, objection
 from scara_ident.diagnosis.testing.acceptance import Decision
 from scara_ident.diagnosis.testing.candidate_tests import held_out_gains
 from scara_ident.diagnosis.testing.selection_step import SelectionStep, best_of_each
 from scara_ident.effects import Scene
 
-# Differences below this share of what the effect removes are rounding: two models with the same span leave the same.
-ROUNDING = 1e-9
 # Columns at the base model's estimate have at least this share of the gain that columns at the last estimate have.
 MIN_PRELIMINARY_SHARE = 0.5
 

@@ -189,7 +189,8 @@ def search(task: SearchTask, columns: CandidateColumns, *, known: Search | None 
         pool = tuple(item for item in pool if not columns.not_finite_on(scene, item))
     tried = max(1, len(candidates))
     step = SelectionStep(scene, columns, (), start.weights, tried, task.criteria, start.offsets)
-    state = SearchState(step, start.value, pool, candidates)
+    afterwards = frozenset(effect.name for effect in families if effect.after_correction)
+    state = SearchState(step, start.value, pool, candidates, after_correction=afterwards)
     return _searched(task, _Base(start, observations, scene, notes), state, known, frozenset(), ())
 
 
@@ -227,7 +228,8 @@ class _Base:
 
 def _beginnings(known: Search) -> list[Candidate]:
     """Return what an earlier search found: it may be between the grid points and not visible at any of them."""
-    return [item for item in known.chosen if not item.effect.fitted_first]
+    # The rest of a correction is added together with the correction.
+    return [item for item in known.chosen if not (item.effect.fitted_first or item.effect.after_correction)]
 
 
 def _searched(

@@ -67,6 +67,8 @@ class SearchState:
         Effects replaced by others.
     asked : tuple of Candidate
         Beside which effects was last asked for some that act in intervals.
+    after_correction : frozenset of str
+        Effects that are tried only after a correction that leaves them.
     """
 
     step: SelectionStep
@@ -77,6 +79,7 @@ class SearchState:
     correction: Correction | None = None
     exchanges: int = 0
     asked: tuple[Candidate, ...] = ()
+    after_correction: frozenset[str] = frozenset()
 
     @property
     def labels(self) -> set[str]:
@@ -139,7 +142,8 @@ class SearchState:
         if candidate.corrects_data:
             state = state.corrected(candidate)
         else:
-            state = replace(state, step=replace(state.step, chosen=(*state.step.chosen, candidate)))
+            rest = None if candidate == state.step.rest else state.step.rest
+            state = replace(state, step=replace(state.step, chosen=(*state.step.chosen, candidate), rest=rest))
         settled = candidate.effect.of_each_recording or candidate.effect.settled(winner.examination.value)
         if settled or not candidate.corrects_data:
             # What each recording has of its own is taken out until nothing is left, and once more at the end.
@@ -160,4 +164,18 @@ class SearchState:
         correction = found.beside(self.correction)
         left = correction.left(self.step.scene)
         step = replace(self.step, columns=columns, rest=None if left is None else left[0])
-        return replace(self, step=step, correction=correction)
+        return replace(self, step=step, correction=correction).with_rest()
+
+    def with_rest(self) -> SearchState:
+        """Return the state with the present rest of the correction: a candidate if it is an effect, or in the model if found."""
+        rest, scene = self.step.rest, self.step.scene
+        if rest is None or rest.effect.name not in self.after_correction:
+            return self
+        name = rest.label(scene)
+        chosen, pool, candidates = (
+            tuple(rest if item.label(scene) == name else item for item in items)
+            for items in (self.step.chosen, self.pool, self.candidates)
+        )
+        step = replace(self.step, chosen=chosen, rest=None if rest in chosen else rest)
+        state = replace(self, step=step, pool=pool, candidates=candidates)
+        return state if rest in pool else state.with_more([rest])

@@ -24,6 +24,7 @@ from scara_ident.simulation.effects.sensors import (
     JointZero,
     OffsetDrift,
     TimeDelay,
+    TorqueFilter,
     TorqueGainMismatch,
     TorqueSensorNonlinearity,
 )
@@ -54,7 +55,7 @@ CATALOGUE: tuple[type[Effect], ...] = (
     Vibration,
 )
 # What an arm may have or meet beside them.
-OTHERS: tuple[type[Effect], ...] = (Push, Payload, CoupledShaft, JointZero, SmoothCoulomb)
+OTHERS: tuple[type[Effect], ...] = (Push, Payload, CoupledShaft, JointZero, SmoothCoulomb, TorqueFilter)
 UNLISTED: tuple[type[Effect], ...] = (UnlistedSignedSine, UnlistedSwingingViscous)
 EFFECTS: dict[str, type[Effect]] = {effect.name: effect for effect in (*CATALOGUE, *OTHERS, *UNLISTED)}
 

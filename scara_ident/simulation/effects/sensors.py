@@ -30,6 +30,22 @@ class TimeDelay(Effect):
 
 
 @dataclass(frozen=True)
+class TorqueFilter(Effect):
+    """Effort of the whole arm that is recorded after a low-pass filter of first order: ``time_constant dr/dt + r = u``."""
+
+    name: ClassVar[str] = "torque_filter"
+    units: ClassVar[dict[str, str]] = {"time_constant": "s"}
+    bounds: ClassVar[dict[str, tuple[float, float]]] = {"time_constant": (0.0, 1.0)}
+    whole_arm = "always"
+    time_constant: float = 0.01
+
+    def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:
+        """Set the time constant of all joints."""
+        vacant(self, float(draft.lag.max()))
+        draft.lag[:] = self.time_constant
+
+
+@dataclass(frozen=True)
 class TorqueSensorNonlinearity(Effect):
     """A torque that is recorded as ``u + square u^2 + cubic u^3``."""
 

@@ -271,6 +271,10 @@ def test_what_was_shown_is_taken_back_on_the_joint_that_is_worse_and_only_there(
         (0.1, 0.35, False, True),
         (0.0, 0.51, False, False),
         (-0.4, 1.6, False, False),
+        # A torque scale of 2.6 % that was none showed six times; what is there may show more where it is unsure, or a half more.
+        (6.1, 1.3, False, True),
+        (3.0, 0.8, True, False),
+        (1.6, 0.1, True, False),
     ],
 )
 def test_what_is_sure_enough_is_said_and_nothing_else(size: float, std: float, borne_out: bool, against: bool):

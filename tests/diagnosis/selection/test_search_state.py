@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import bilinear, lfilter
 
 from scara_ident.diagnosis.candidates.candidates import Candidate, CandidateColumns
 from scara_ident.diagnosis.criteria import CRITERIA
@@ -18,6 +19,7 @@ from scara_ident.effects.elasticity import JointElasticity
 from scara_ident.effects.friction import AsymmetricFriction
 from scara_ident.effects.measurement import TimeDelay, shifted
 from scara_ident.effects.position import Spring
+from scara_ident.effects.torque_filter import TorqueFilter
 from scara_ident.estimation import wls
 from scara_ident.estimation.run_offsets import rms_of
 from tests.diagnosis.made import complete, exact_runs, observed, with_torque
@@ -102,6 +104,40 @@ def test_a_delay_is_taken_out_of_the_data_and_its_sizes_add_up():
     whole = replace(state, correction=first).corrected(first.candidate).correction
     assert whole is not None
     assert whole.value[0] == pytest.approx(first.value[0] + after.correction.value[0], rel=1e-2)
+
+
+def filtered(runs, time_constant: float = 0.008):
+    return [
+        replace(
+            run, effort=lfilter(*bilinear([1.0], [time_constant, 1.0], 1.0 / (run.time[1] - run.time[0])), run.effort)
+        )
+        for run in runs
+    ]
+
+
+def test_what_a_correction_leaves_is_tried_then_and_follows_it():
+    effect = TorqueFilter()
+    state = replace(begun(filtered(exact_runs()), TimeDelay()), after_correction=frozenset([effect.name]))
+    late = let_in(state, "time_delay")
+    assert late.correction is not None
+    (rest,) = [item for item in late.candidates if item.effect.name == effect.name]
+    assert rest == late.step.rest == late.pool[-1]
+    assert rest.effect == TorqueFilter(float(late.correction.value[0]))
+    assert late.step.tried == state.step.tried + 1
+    there = let_in(late, effect.name)
+    assert (there.step.chosen, there.step.rest) == ((rest,), None)
+    # What is left of the delay beside it moves it.
+    again = there.corrected(late.correction.candidate)
+    assert again.correction is not None
+    assert again.correction.value[0] == pytest.approx(0.008, abs=1e-4)
+    (moved,) = again.step.chosen
+    assert moved.effect == TorqueFilter(float(again.correction.value[0])) != rest.effect
+    assert again.step.rest is None
+    assert again.pool == (*state.pool, moved)
+    # Of a search without such an effect it stays what may be left.
+    other = let_in(begun(filtered(exact_runs()), TimeDelay()), "time_delay")
+    assert other.step.rest == rest
+    assert other.pool == state.pool
 
 
 def test_what_is_gone_back_to_holds_no_fit_and_not_the_columns_before_a_correction():

@@ -35,6 +35,7 @@ NOTHING = [
     fx.BaseTilt(tilt_x=0.0, tilt_y=0.0),
     fx.PayloadChange(mass=0.0, time=0.3),
     fx.TimeDelay(delay=0.0),
+    fx.TorqueFilter(time_constant=0.0),
     fx.TorqueSensorNonlinearity(cubic=0.0),
     fx.TorqueSensorNonlinearity(cubic=0.0, square=0.0),
     fx.TorqueGainMismatch(ratio=1.0),
