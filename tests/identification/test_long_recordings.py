@@ -67,7 +67,7 @@ def test_parts_say_what_the_whole_says(run, tmp_path, monkeypatch, method):
     path = written(tmp_path, run)
     parts = identify(ROBOT, in_parts(monkeypatch, path), method=method, bands=BANDS)
     assert_same(parts, identify(ROBOT, path, method=method, bands=BANDS))
-    assert "of all 15000 samples, read in 4 parts" in " ".join(parts.notes)
+    assert "from all 15000 samples, read in 4 parts" in " ".join(parts.notes)
 
 
 @pytest.mark.slow

@@ -56,7 +56,7 @@ def test_a_soft_first_joint_is_found_alone_with_its_stiffness():
     assert told.std < 0.03 * stiffness
     (entry,) = diagnosis_dict(found)["effects"]
     assert entry["direct"]["stiffness"]["value"] == told.value
-    assert any("tells stiffness" in sentence and "agrees" in sentence for sentence in sentences(found))
+    assert any("gives stiffness" in sentence and "agrees" in sentence for sentence in sentences(found))
 
 
 @pytest.mark.slow

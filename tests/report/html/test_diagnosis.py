@@ -47,7 +47,7 @@ def test_above_the_residual_stands_the_law_of_the_effect_and_what_is_measured_of
     data = data_of(diagnosed)
     panels = data["figures"]["effect-1-view"]["variants"][""]["panels"]
     assert [panel["label"] for panel in panels] == ["torque [N m]", "residual [N m]"]
-    for name in ("the effect as found", "measured minus the rest of the model of the model"):
+    for name in ("the effect as found", "measured minus the rest of the model"):
         (layer,) = [layer for layer in panels[0]["layers"] if layer.get("name") == name]
         pairs = [(x, y) for x, y in zip(layer["x"], layer["y"], strict=True) if y is not None]
         assert np.polyfit(*np.array(pairs).T, 1)[0] == pytest.approx(0.05, abs=0.01)
