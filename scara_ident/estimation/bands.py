@@ -105,7 +105,10 @@ def _widened(
     """
     lower, upper = floor.copy(), np.full(len(bands), np.inf)
     bands = np.clip(bands, floor, highest)
-    fit = spectra.fit(bands) if known is None else spectra.judged(known.bands, known.value)
+    if known is None:
+        bands, fit = _risen(spectra, bands, highest)
+    else:
+        fit = spectra.judged(known.bands, known.value)
     while True:
         # If a band contains so much noise that nothing is explained, a narrower one may explain something.
         wanted = np.where(fit.explains > 0.0, np.minimum(fit.explains, highest), 0.5 * bands)
@@ -115,6 +118,24 @@ def _widened(
         if np.all((bands >= fit.bands) & (bands <= NEAR_FIT * fit.bands)):
             return bands, fit
         fit = spectra.fit(bands)
+
+
+def _risen(spectra: Spectra, bands: Array, highest: float) -> tuple[Array, Explained]:
+    """Return the bands to begin with, and the fit in them: wider ones of joints that these leave unexplained and wider ones explain.
+
+    A fit that does not explain the band that it was made in is behind too much noise, or in too narrow a band: of an even motion
+    with sharp turns a filter takes away what tells inertia, and what is fast in two signals is part of the slow torque that their product
+    makes. Wider bands show which.
+    """
+    tried = bands
+    while True:
+        fit = spectra.fit(tried)
+        short = fit.explains < tried
+        bands = np.where(short, bands, tried)
+        rising = short & (tried < highest)
+        if not np.any(rising):
+            return bands, fit if np.array_equal(tried, bands) else spectra.fit(bands)
+        tried = np.where(rising, np.minimum(2.0 * tried, highest), tried)
 
 
 def _choice(model: TorqueModel, bands: Array, fit: Explained, edges: Array, floor: Array, moving: Array) -> BandChoice:

@@ -30,8 +30,8 @@ OF_LAG = 2
 # Standard deviations by which the noise moves a parameter before that is said.
 SPOKEN_OF = 1.0
 
-# Of observations the last parameters that `noise_torque` was asked for, and what it found.
-_LAST: WeakKeyDictionary[Observations, tuple[Array, Array]] = WeakKeyDictionary()
+# Of observations the last parameters that the noise in the torque was asked for, and what was found.
+_LAST: WeakKeyDictionary[Observations, tuple[Array, Array, Array]] = WeakKeyDictionary()
 
 
 def noise_bias(observations: Observations, weights: Array, value: Array | None) -> Array | None:
@@ -78,16 +78,47 @@ def _drawn_again(observations: Observations, places: Sequence[int]) -> tuple[Inf
 def noise_torque(observations: Observations, value: Array) -> Array:
     """Return the rms that the noise of positions makes in the torque that parameters predict, within the bands, shape (n,).
 
-    That of the last parameters is kept, for more than one ask for it, and cannot be written to.
-
     Parameters
     ----------
     value : ndarray, shape (p,)
     """
-    known = _LAST.get(observations)
-    if known is None or not np.array_equal(known[0], value):
-        known = _LAST[observations] = value.copy(), _noise_torque(observations, value)
-    return known[1]
+    squares, counts = _noise_in_blocks(observations, value)
+    return np.asarray(np.sqrt(squares.sum(axis=1) / np.maximum(counts.sum(axis=1), 1.0)))
+
+
+def largest_noise_torque(observations: Observations, value: Array, chance: float) -> Array:
+    """Return the rms that another draw of the noise makes, beyond which it is by chance alone this seldom, shape (n,).
+
+    An encoder's steps come again where a motion does to less than a step, the same in each repetition: what repeats is then one draw of
+    the noise on as many motions as there are, beside another draw on all recordings. Mean squares of either have the degrees of
+    freedom that blocks of time show, and their ratio is Fisher's F.
+
+    Parameters
+    ----------
+    value : ndarray, shape (p,)
+    chance : float
+    """
+    from scipy.special import fdtri
+
+    data = observations.data
+    usual, (squares, counts) = noise_torque(observations, value), _noise_in_blocks(observations, value)
+    once = np.array(
+        [
+            label not in data.labels[:place]
+            for place, (label, item) in enumerate(zip(data.labels, data.recordings, strict=True))
+            for part in item.stretches
+            for _ in part.blocks[1:]
+        ],
+        dtype=bool,
+    )
+    result = usual.copy()
+    for joint, (square, count) in enumerate(zip(squares, counts, strict=True)):
+        spread = float(np.sum((square - count * usual[joint] ** 2) ** 2))
+        if spread > 0.0:
+            freedom = 2.0 * float(np.sum(square)) ** 2 / spread
+            of_motions = max(1.0, freedom * float(np.sum(count[once]) / np.sum(count)))
+            result[joint] *= np.sqrt(float(fdtri(of_motions, max(1.0, freedom), 1.0 - chance)))
+    return result
 
 
 def noise_signals(observations: Observations, value: Array) -> list[Array]:
@@ -102,16 +133,21 @@ def noise_signals(observations: Observations, value: Array) -> list[Array]:
     return [twice - once for once, twice in zip(observations.predicted(value), again, strict=True)]
 
 
-def _noise_torque(observations: Observations, value: Array) -> Array:
-    square, count = np.zeros(len(observations.joints)), np.zeros(len(observations.joints))
-    for part, signals in zip(observations.data.stretches, noise_signals(observations, value), strict=True):
-        for joint, signal in enumerate(signals):
-            made = part.smooth(joint, signal)[part.used[joint]]
-            square[joint] += float(made @ made)
-            count[joint] += len(made)
-    result = np.asarray(np.sqrt(square / np.maximum(count, 1.0)))
-    result.flags.writeable = False
-    return result
+def _noise_in_blocks(observations: Observations, value: Array) -> tuple[Array, Array]:
+    """Return the sum of squares of each joint in each block of time, and of how many samples, both of shape (n, blocks).
+
+    What was found of the last parameters is kept, for more than one ask for it.
+    """
+    known = _LAST.get(observations)
+    if known is None or not np.array_equal(known[0], value):
+        squares, counts = [np.zeros((len(observations.joints), 0))], [np.zeros((len(observations.joints), 0))]
+        for part, signals in zip(observations.data.stretches, noise_signals(observations, value), strict=True):
+            made = np.array([part.smooth(joint, signal) for joint, signal in enumerate(signals)])
+            used = np.array(part.used)
+            squares.append(np.add.reduceat(np.where(used, made, 0.0) ** 2, part.blocks[:-1], axis=1))
+            counts.append(np.add.reduceat(used.astype(float), part.blocks[:-1], axis=1))
+        known = _LAST[observations] = value.copy(), np.hstack(squares), np.hstack(counts)
+    return known[1], known[2]
 
 
 def noisy(data: PreparedData, derivatives: int = 0) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import astuple, dataclass, replace
+from dataclasses import astuple, dataclass, fields, replace
 from itertools import chain
 from typing import Any, Literal
 
@@ -57,6 +57,7 @@ class Suspect:
         return {
             "effect": effect.name,
             "variant": _variant(effect),
+            "options": _numbers(effect),
             "label": self.label,
             "place": member.joint,
             "partner": member.partner,
@@ -152,7 +153,9 @@ def suspect_of(entry: Mapping[str, Any]) -> Suspect:
     nonlinear, value = (tuple(float(x) for x in entry[key]) for key in ("nonlinear", "value"))
     intervals = tuple(Interval(*item) for item in entry.get("intervals", ()))
     member = Member(entry["place"], nonlinear, entry["partner"], intervals)
-    candidate = Candidate(families[entry["variant"]], member)
+    # Results of earlier versions have no options.
+    family = replace(families[entry["variant"]], **entry.get("options", {}))
+    candidate = Candidate(family, member)
     return Suspect(candidate, str(entry["label"]), value, float(entry.get("odds", 1.0)))
 
 
@@ -160,6 +163,12 @@ def _variant(effect: Effect) -> int:
     families = EFFECTS.get(effect.name) if effect.name in EFFECTS.names() else ()
     alike = [k for k, family in enumerate(families) if type(family) is type(effect)]
     return next((k for k in alike if families[k] == effect), alike[0] if alike else -1)
+
+
+def _numbers(effect: Effect) -> dict[str, float]:
+    """Return the options of a family that are numbers, as the delay that a correction had."""
+    options = {item.name: getattr(effect, item.name) for item in fields(effect)}
+    return {name: value for name, value in options.items() if type(value) in (int, float)}
 
 
 def questions(diagnosis: Diagnosis) -> tuple[Question, ...]:

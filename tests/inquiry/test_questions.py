@@ -9,13 +9,18 @@ import numpy as np
 import pytest
 
 from scara_ident.diagnosis import Unexplained
+from scara_ident.diagnosis.candidates.candidates import Candidate
+from scara_ident.effects import Member
+from scara_ident.effects.torque_filter import TorqueFilter
 from scara_ident.errors import UsageError
 from scara_ident.files import plain
 from scara_ident.inquiry.questions import (
     MAX_ODDS,
+    Suspect,
     odds_of,
     question_of,
     questions,
+    suspect_of,
     suspects_in_model,
 )
 from tests.inquiry.asked import PAIR, coarse_diagnosis, open_diagnosis
@@ -90,3 +95,12 @@ def test_of_members_of_which_nothing_is_known_that_which_takes_fewest_standard_e
 
     assert asked(lonely, usual) == asked(usual)
     assert asked(usual, likely, lonely) == asked(likely) != asked(usual)
+
+
+def test_options_of_a_family_that_are_numbers_come_again():
+    """What a delay of 3.5 ms left was asked for as what one of 10 ms leaves."""
+    candidate = Candidate(TorqueFilter(0.0035), Member(None))
+    entry = json.loads(json.dumps(Suspect(candidate, "torque_filter", (0.3, 0.1)).entry()))
+    assert suspect_of(entry).candidate == candidate
+    del entry["options"]
+    assert suspect_of(entry).candidate.effect == TorqueFilter()

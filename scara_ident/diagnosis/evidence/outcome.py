@@ -19,7 +19,7 @@ from scara_ident.diagnosis.testing.selection_step import observed_at_every_sampl
 from scara_ident.estimation import Estimate, wls
 from scara_ident.estimation.assumed_variation import assumed_variation
 from scara_ident.estimation.least_squares import value_and_weights
-from scara_ident.estimation.noise_bias import noise_torque
+from scara_ident.estimation.noise_bias import largest_noise_torque
 from scara_ident.estimation.observations import Observations
 from scara_ident.estimation.residuals import Residuals
 from scara_ident.estimation.run_variation import MIN_RUNS, RunVariation
@@ -64,7 +64,7 @@ class Outcome:
     small : tuple of float
         What is too small on each joint to be called a remainder, where one is significant; 0 elsewhere. N m or N.
     of_positions : tuple of float
-        What of it the noise of the positions makes.
+        What of it the noise of the positions may make.
     repeating : frozenset of str
         Joints on which more repeats than noise, however small beside the torque, of however few moments or frequencies.
     demoted : tuple of Decision
@@ -138,7 +138,7 @@ def outcome_of(task: SearchTask, found: Search) -> Outcome:
     if depending or any(fit.p_value < criteria.significant for fit in fit_after):
         # What the positions' noise does to the columns may repeat too; and what is small beside the torque is not called one.
         torque = [item.torque_rms if item.rows else 0.0 for item in training.by_joint]
-        made = noise_torque(training, after.value)
+        made = largest_noise_torque(training, after.value, criteria.significant / len(joints))
         small = np.maximum(made, np.array(list(min_share.values())) * torque)
     min_rms, of_positions = (dict(zip(joints, each.tolist(), strict=True)) for each in (small, made))
     # A force that nearly all goes with the position is neither a filter's nor an encoder's, though no effect of an arm is so.

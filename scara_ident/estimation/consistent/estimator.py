@@ -159,10 +159,9 @@ def _estimate(
             plain.information.regressor_factor.T @ (plain.information.regressor_factor @ plain.noise_bias)
         )
         covariance += np.outer(bias, bias)
-    held = _half_along(information, np.diag(sizes), sizes).shape[1] - along.shape[1]
-    if held > 0:
-        apart = float(np.sum((information.regressor_factor @ (value - plain.value)) ** 2)) / held
-        covariance = _beyond_constraints(covariance, plain.covariance, apart)
+    covariance = _beyond_constraints(
+        covariance, plain.covariance, _apart(value - plain.value, plain.covariance, along, sizes)
+    )
     covariance[np.diag_indices_from(covariance)] = np.where(undetermined, np.inf, np.diag(covariance))
     return ConsistentEstimate(
         model=observations.model,
@@ -242,7 +241,35 @@ def _free_directions(u: Unknowns, found: ConsistentSolution) -> tuple[Array, tup
     return u.to_parameters @ free, labels
 
 
-def _beyond_constraints(covariance: Array, plain: Array, apart: float) -> Array:
+def _apart(moved: Array, plain: Array, along: Array, size: Array) -> float | None:
+    """Return by how many standard deviations, squared, data lie beyond a constraint in the mean over these; None where nothing holds.
+
+    Standard deviations are those of the data, noise that remembers and runs that differ counted: by white noise, in whose metric
+    the fit is made, data would lie the further beyond the more of either there is.
+
+    Parameters
+    ----------
+    moved : ndarray, shape (p,)
+        From the estimate of the data alone.
+    plain : ndarray, shape (p, p)
+        Covariance of the data alone; infinite variances where they leave a parameter open.
+    along : ndarray, shape (p, k)
+        Directions in which the parameters can still move.
+    size : ndarray, shape (p,)
+        Of the parameters, as a unit of each.
+    """
+    from scipy.linalg import null_space, pinvh
+
+    known = np.isfinite(np.diag(plain))
+    across = null_space((along / size[:, None])[known].T) / size[known, None]
+    if not across.shape[1]:
+        return None
+    step = across.T @ moved[known]
+    spread = across.T @ plain[np.ix_(known, known)] @ across
+    return float(step @ pinvh(spread) @ step / len(step))
+
+
+def _beyond_constraints(covariance: Array, plain: Array, apart: float | None) -> Array:
     """Return the covariance with what data leave open across the constraints that hold them.
 
     Had data been others, a constraint would not have held them, or another would: what is found on it is no more sure for it
@@ -255,11 +282,13 @@ def _beyond_constraints(covariance: Array, plain: Array, apart: float) -> Array:
         Along the constraints.
     plain : ndarray, shape (p, p)
         Of the data alone; infinite variances where they leave a parameter open.
-    apart : float
-        By how many standard deviations, squared, the data lie beyond a constraint in the mean over these.
+    apart : float or None
+        By how many standard deviations, squared, the data lie beyond a constraint in the mean over these, see `_apart`.
     """
     from scipy.special import log_ndtr
 
+    if apart is None:
+        return covariance
     beyond = np.sqrt(apart)
     tail = float(np.exp(-0.5 * apart - log_ndtr(-beyond)) / np.sqrt(2.0 * np.pi))
     share = float(np.clip(1.0 + apart - beyond * tail, 0.0, 1.0))

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 from scara_ident.estimation import ConsistentEstimate
 from scara_ident.estimation.joint_rows import JointRows
@@ -101,12 +102,15 @@ def stroke(robot: Robot, speed: float = 0.65) -> Motion:
 
 
 @one_blas_thread()
-def observed(model: TorqueModel, item: Motion, value: Array, noise: float, seed: int = 0) -> Observations:
-    """Rows of a motion, unfiltered, with white noise, in blocks of 200 samples; without prepared data."""
+def observed(
+    model: TorqueModel, item: Motion, value: Array, noise: float, seed: int = 0, memory: float = 0.0
+) -> Observations:
+    """Rows of a motion, unfiltered, with noise of which a sample keeps a share, in blocks of 200 samples; without prepared data."""
     w = model.regressor(item)
     u = np.einsum("jpn,p->jn", w, value)
     sigma = noise * np.sqrt(np.mean(u**2, axis=1, keepdims=True))
-    u = u + sigma * np.random.default_rng(seed).standard_normal(u.shape)
+    white = np.random.default_rng(seed).standard_normal(u.shape)
+    u = u + sigma * lfilter([np.sqrt(1.0 - memory**2)], [1.0, -memory], white, axis=1)
     columns, starts = np.arange(len(value)), np.array([*range(0, u.shape[1], 200), u.shape[1]])
     joints = tuple(
         JointRows(columns, np.vstack([rows, torque]), starts, np.diff(starts).astype(float))
