@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import NORMAL_MEDIAN, Array
 from scara_ident.manners import several
-from scara_ident.recording.audit.samples import Checked, Finding, Samples
+from scara_ident.recording.audit.samples import Checked, Finding, Samples, resolution
 
 # Samples on either side of a step that a parabola with a jump at the step is fitted to.
 SIDE = 3
@@ -33,6 +33,10 @@ MIN_LOST_SHARE, MIN_LOST = 1e-3, 3
 EVEN_SHARE = 0.3
 # Rounding of positions, as a share of the way of the fastest sample.
 ROUNDING = 1e-4
+# Std of the rounding to an encoder's steps, as a share of one step: that of a uniform distribution.
+ROUNDING_STD = 12.0**-0.5
+# A jump ahead counts if it is this many times the std that follows from the residual of its fit. At a sharp turn the residual is large.
+CLEAR = 4.0
 
 
 def restamped(samples: Samples) -> Checked:
@@ -62,7 +66,7 @@ def _judged(samples: Samples, missing: Array, least: float) -> Finding | None:
         f"samples are lost, but the clock is even (made afterwards): "
         f"{'all joints jump' if len(samples.position) > 1 else 'the joint jumps'} ahead by the way of "
         f"{'a sample or more' if usual < SEVERAL else f'about {usual} samples'} in {100 * share:.2g} % of the steps in motion, "
-        f"first before {samples.where(int(np.argmax(ahead)) + 1)}, and in all about {100 * gone:.2g} are missing "
+        f"first before {samples.where(int(np.argmax(ahead)) + 1)}, and in all about {float(f'{100 * gone:.2g}'):g} are missing "
         "for every 100 recorded"
     )
     if max(share, gone) > MAX_LOST_SHARE:
@@ -80,6 +84,8 @@ def _missing(samples: Samples) -> tuple[Array, Array]:
     fit = np.linalg.pinv(np.column_stack([np.ones_like(place), place, place**2, place > 0]))
     window = sliding_window_view(samples.position, 2 * SIDE, axis=1)
     way, jump = window @ fit[1], window @ fit[3]
+    noise, beside = float(np.linalg.norm(fit[3])), np.linalg.svd(fit)[2][len(fit) :]
+    rest = np.linalg.norm(window @ beside.T, axis=2) / len(beside) ** 0.5
     moving = np.abs(way) > MOVING_SHARE * np.sqrt(np.mean(_undisturbed(way) ** 2, axis=1, keepdims=True))
     weight, idle = np.zeros_like(way), samples.idle()
     for j, inside in enumerate(moving):
@@ -88,7 +94,10 @@ def _missing(samples: Samples) -> tuple[Array, Array]:
             # Losses within less than half of the windows leave it alone.
             usual = float(np.median(np.abs(jump[j, inside]))) / NORMAL_MEDIAN
             floor = ROUNDING * float(np.max(np.abs(way[j])))
-            weight[j, inside] = 1.0 / max(usual, floor) ** 2
+            # At constant speed most steps of a coarse encoder are equal: the usual jump is then smaller than its rounding.
+            rounded = resolution(samples.position[j]) * ROUNDING_STD * noise
+            weight[j, inside] = 1.0 / max(usual, floor, rounded) ** 2
+    jump[(way * jump > 0.0) & (np.abs(jump) < CLEAR * noise * rest)] = 0.0
     known = np.sum(weight * way**2, axis=0)
     missing, std = np.full((2, samples.count - 1), np.nan)
     determined = (known > 0.0) & _even(samples)

@@ -57,6 +57,28 @@ def test_whole_recordings_are_passed(bits: int, jolts: int):
         assert restamped(moved(seed, step=2 * np.pi / 2**bits, jolts=jolts))[1] == []
 
 
+def back_and_forth(seed: int, interval: float, turn: float, step: float) -> Samples:
+    """Two joints at even speeds, which turn within so many seconds (s), behind an encoder of such steps (rad)."""
+    random = np.random.default_rng(seed)
+    time = interval * np.arange(round(20.0 / interval))
+    position = np.empty((2, len(time)))
+    over = max(round(turn / interval), 1)
+    for joint in position:
+        way = np.arcsin(np.sin(2 * np.pi * random.uniform(0.05, 0.3) * time)) * random.uniform(0.1, 0.6)
+        joint[:] = np.convolve(np.pad(way, over, mode="edge"), np.ones(over) / over, "same")[over:-over]
+    position = step * np.floor(position / step)
+    return Samples("a.csv", ROBOT, time, position, None, np.arange(1, len(time) + 1))
+
+
+@pytest.mark.parametrize("interval", [1e-3, 2e-3, 4e-3, 8e-3])
+@pytest.mark.parametrize("bits", [10, 12, 14, 16, 20])
+def test_even_speeds_and_sharp_turns_are_no_loss(interval: float, bits: int):
+    """The rare long step of a coarse encoder at an even speed, and the turns of a log at 125 Hz, were refused."""
+    for seed in range(200, 212):
+        for turn in (0.0, 0.01, 0.03):
+            assert restamped(back_and_forth(seed, interval, turn, 2 * np.pi / 2**bits))[1] == [], (seed, turn)
+
+
 def test_joints_that_stand_still_say_nothing():
     whole = moved()
     position = np.array([np.full(whole.count, 0.7), 1e29 * whole.position[1]])
