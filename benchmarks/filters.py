@@ -1,6 +1,6 @@
-"""What the diagnosis makes of torque that was logged behind a filter, by arms and filters.
+"""What the diagnosis makes of torque, or positions, that were logged behind a filter, by arms and filters.
 
-Four recordings of two motions (500 Hz, 22 bits, white noise of 1 % of the torque) of a random arm that lacks nothing. The efforts of all
+Four recordings of two motions (500 Hz, 22 bits, white noise of 1 % of the torque) of a random arm that lacks nothing. The efforts or positions of all
 joints then go through a filter of SciPy whose delay at rest is given. The table has what was found, the errors of the
 inertial base parameters in standard deviations (root mean square, largest), and the verdict; a row each set of recordings.
 
@@ -21,7 +21,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 from attribution_truth import coverage, true_parameters
 from numpy.typing import NDArray
-from scipy.signal import bilinear, butter, lfilter, lfilter_zi
+from scipy.signal import bilinear, butter, lfilter
 from virtual_conditions import Asked
 from virtual_sets import simulate_set
 
@@ -48,14 +48,16 @@ def coefficients(kind: str, delay: float) -> tuple[Array, Array]:
     return taps, np.array([1.0])
 
 
-def filtered(recordings: Sequence[Recording], kind: str, delay: float) -> list[Recording]:
-    """Return recordings whose efforts went through a filter that had begun at their first value."""
+def filtered(recordings: Sequence[Recording], kind: str, delay: float, of: str) -> list[Recording]:
+    """Return recordings whose efforts or positions went through a filter that ran before, at the first effort or speed."""
+    up, down = coefficients(kind, delay)
     found = []
     for item in recordings:
-        assert item.effort is not None
-        up, down = coefficients(kind, delay)
-        start = lfilter_zi(up, down)
-        found.append(replace(item, effort=np.array([lfilter(up, down, u, zi=start * u[0])[0] for u in item.effort])))
+        signal = getattr(item, of)
+        speed = 0.0 if of == "effort" else (signal[:, 5:6] - signal[:, :1]) * RATE / 5.0
+        line = signal[:, :1] + speed * (item.time - item.time[0])
+        late = line - delay * speed + lfilter(up, down, signal - line, axis=1)
+        found.append(replace(item, velocity=None, **{of: late}))
     return found
 
 
@@ -67,6 +69,7 @@ def main() -> None:
     parser.add_argument(
         "--filters", nargs="+", default=FILTERS, help="kind:delay in s; lag, butterworth, mean or delay"
     )
+    parser.add_argument("--of", choices=("effort", "position"), default="effort", help="what goes through the filter")
     given = parser.parse_args()
     print("| arm | filter | found | inertial errors, std: rms, largest | verdict |\n|---|---|---|---|---|")
     for seed in given.seeds:
@@ -74,7 +77,9 @@ def main() -> None:
             made = simulate_set("none", seed, given.robot, Path(place) / "set", ASKED)
             for text in given.filters:
                 kind, delay = text.split(":")
-                training, held_out = (filtered(items, kind, float(delay)) for items in (made.training, made.held_out))
+                training, held_out = (
+                    filtered(items, kind, float(delay), given.of) for items in (made.training, made.held_out)
+                )
                 result = diagnose(made.robot, training, validation=held_out)
                 said = "; ".join(
                     f"{item.label} " + ", ".join(f"{k} {p.value:.4g} ± {p.std:.1g}" for k, p in item.parameters.items())

@@ -98,6 +98,7 @@ CASES = {
     "backlash": Case("backlash:joint1:width=0.004"),
     "time_delay": Case("time_delay:delay=0.012"),
     "torque_filter": Case("torque_filter:time_constant=0.02", rate=500.0),
+    "position_filter": Case("position_filter:time_constant=0.02", rate=500.0),
     "joint_zero": Case("joint_zero:shoulder_lift_joint:offset=0.3", UPPER_ARM),
     "joint_elasticity": Case("joint_elasticity:joint1:stiffness=2500"),
     "coupled_shaft": Case("coupled_shaft", WRIST),

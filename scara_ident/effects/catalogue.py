@@ -10,6 +10,8 @@ from scara_ident.effects.coupling import DriveCoupling, InertiaCoupling
 from scara_ident.effects.drift import OffsetDrift, WarmUp
 from scara_ident.effects.effect import Effect
 from scara_ident.effects.elasticity import Backlash, JointElasticity
+from scara_ident.effects.filters.position_filter import PositionFilter
+from scara_ident.effects.filters.torque_filter import TorqueFilter
 from scara_ident.effects.friction import AsymmetricFriction, FrictionCoupling, PositionDependentFriction, Stribeck
 from scara_ident.effects.gear import TransmissionLoss
 from scara_ident.effects.joint_zero import JointZero
@@ -23,7 +25,6 @@ from scara_ident.effects.recording_delays import DelayOfEachRecording
 from scara_ident.effects.shaft import CoupledShaft
 from scara_ident.effects.smooth_coulomb import SmoothCoulomb
 from scara_ident.effects.tilt import BaseTilt, NominalBaseTilt
-from scara_ident.effects.torque_filter import TorqueFilter
 from scara_ident.errors import ArgumentError
 from scara_ident.registry import Registry
 
@@ -58,6 +59,7 @@ CATALOGUE: tuple[Effect, ...] = (
     TimeDelay(),
     DelayOfEachRecording(),
     TorqueFilter(),
+    PositionFilter(),
     JointZero(),
     JointElasticity(),
     Backlash(),

@@ -11,14 +11,15 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.effects.effect import DOUBT_STDS, Effect
+from scara_ident.effects.filters.filter_rest import FILTERED
+from scara_ident.effects.filters.late_turn import LateTurn, lacking
+from scara_ident.effects.filters.position_filter import PositionFilter
+from scara_ident.effects.filters.torque_filter import TorqueFilter
 from scara_ident.effects.following import EstimateSlopes, predicted_slopes
 from scara_ident.effects.links import shared
 from scara_ident.effects.parameters import Coefficient, Member, Parameter, View, deviation
-from scara_ident.effects.position_filter import FILTERED, PositionFilter
 from scara_ident.effects.scale_groups import scale_groups
 from scara_ident.effects.signals import Scene, Signals
-from scara_ident.effects.torque_filter import TorqueFilter
-from scara_ident.motion.low_pass import differentiate
 from scara_ident.motion.motion import UNIFORM_TOLERANCE
 from scara_ident.motion.spline import cubic_spline
 from scara_ident.motion.transfer import through
@@ -293,31 +294,8 @@ class TimeDelay(Effect):
         if self.negligible(scene, member, value):
             return None
         delay = float(value[0])
-        left = TorqueFilter(delay) if delay > 0.0 else PositionFilter()
+        left = TorqueFilter(delay) if delay > 0.0 else PositionFilter(-delay)
         return left, Member(None), FILTERED / abs(delay)
-
-
-class LateTurn(Effect):
-    """Coulomb friction of a joint that jumps later than the filtered velocity turns.
-
-    It is no part of an arm and in no catalogue. Acceleration changes where friction jumps, and a narrow filter, which rounds that off,
-    moves the time of the turn, by 1.7 ms in a band of 7 Hz; friction that builds up over a distance is late too. In so narrow a band the
-    few rows where friction jumps have most of what the torque's rate has beyond the model, and would tell a delay that no other row has.
-    """
-
-    name = "late_turn"
-    summary = "friction that changes sign later than the velocity"
-    coefficients = (Coefficient("step_delay", "{torque} s", "Coulomb friction of {joint} times its delay"),)
-    not_simulated = "it is not a property of the arm"
-
-    def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
-        """Return what one unit of Coulomb friction lacks for each second that it is late."""
-        return lacking(signals, signals.sign[member.place : member.place + 1])
-
-
-def lacking(signals: Signals, torque: Array) -> Array:
-    """Return what a torque (k, N) lacks for each second that it is late, ``-du/dt``."""
-    return -differentiate(torque, signals.motion.rate, signals.derivative_cut)[1]
 
 
 def shifted(recording: Recording, delay: float, joints: Sequence[int] | None = None) -> Recording:

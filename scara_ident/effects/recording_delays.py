@@ -8,9 +8,10 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.effects.effect import DOUBT_STDS, Effect
+from scara_ident.effects.filters.late_turn import lacking
 from scara_ident.effects.following import EstimateSlopes
 from scara_ident.effects.friction import friction_of, friction_places
-from scara_ident.effects.measurement import DELAY_STEP, SAMPLING, TimeDelay, lacking
+from scara_ident.effects.measurement import DELAY_STEP, SAMPLING, TimeDelay
 from scara_ident.effects.parameters import Member, Parameter, deviation
 from scara_ident.effects.signals import Scene, Signals
 from scara_ident.estimation.run_variation import MIN_RUNS

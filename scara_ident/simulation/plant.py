@@ -112,6 +112,8 @@ class PlantDraft:
         Time by which the recorded effort lags, s.
     lag : ndarray, shape (n,)
         Time constant of a first-order filter of the recorded effort, s.
+    position_lag : float
+        The same of the recorded positions.
     gain : ndarray, shape (n,)
         Recorded per true torque.
     cubic : ndarray, shape (n,)
@@ -135,6 +137,7 @@ class PlantDraft:
     sensors: dict[str, Array]
     delay: Array
     lag: Array
+    position_lag: float
     gain: Array
     cubic: Array
     square: Array
@@ -215,6 +218,7 @@ def empty_draft(n: int, scale: Array, reduction: Array) -> PlantDraft:
         sensors=sensors,
         delay=zero.copy(),
         lag=zero.copy(),
+        position_lag=0.0,
         gain=np.ones(n),
         cubic=zero.copy(),
         square=zero.copy(),

@@ -17,6 +17,7 @@ from scara_ident.simulation.effects import Effect
 from scara_ident.simulation.effects.structure import Payload
 from scara_ident.simulation.inverse_dynamics import torque_at_start
 from scara_ident.simulation.plant import PlantDraft
+from scara_ident.simulation.position_sensor import recorded_position
 from scara_ident.simulation.reference import MAX_SAMPLES, ReferenceMotion
 from scara_ident.simulation.runs import RunState, TorqueNoise
 from scara_ident.simulation.torque_sensor import recorded_effort
@@ -167,6 +168,7 @@ def simulate(
         (arm.scale[:, None] * added)[back].T, start[back],
         position[:, 0], velocity[:, 0], f"{motion.name} on {arm.robot.name}",
     )  # fmt: skip
+    measured = recorded_position(draft, measured, 1.0 / control)
     effort = recorded_effort(arm, draft, true.effort, true.position, 1.0 / control, ticks if averaged else 1)[
         :, ::ticks
     ]

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from scara_ident.effects import Member, Signals
+from scara_ident.effects.filters.position_filter import PositionFilter
+from scara_ident.effects.filters.torque_filter import TorqueFilter
 from scara_ident.effects.gear import TransmissionLoss
 from scara_ident.effects.measurement import (
     BentTorqueSensor,
@@ -16,8 +18,6 @@ from scara_ident.effects.measurement import (
     TorqueSensorNonlinearity,
     shifted,
 )
-from scara_ident.effects.position_filter import PositionFilter
-from scara_ident.effects.torque_filter import TorqueFilter
 from scara_ident.model.model import build_model
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import load_robot
@@ -262,9 +262,6 @@ def test_only_what_is_late_by_more_than_a_sample_may_be_filtered():
     assert delay.leaves(scene, Member(None), np.array([-0.0015])) is None
     assert delay.leaves(scene, Member(None), np.array([0.02])) == (TorqueFilter(0.02), Member(None), pytest.approx(7.5))
     found = delay.leaves(scene, Member(None), np.array([-0.02]))
-    assert found == (PositionFilter(), Member(None), pytest.approx(7.5))
-    assert PositionFilter().members(scene) == (Member(None),)
-    # A mean of twice its delay keeps most there, and its inverse is what the derivatives say to two thousandths.
+    assert found == (PositionFilter(0.02), Member(None), pytest.approx(7.5))
+    # A mean of twice its delay keeps most there.
     assert np.sinc(0.04 * found[2]) == pytest.approx(0.86, abs=0.01)
-    turned = np.pi * 0.04 * found[2]
-    assert turned / np.sin(turned) == pytest.approx(1.0 + turned**2 / 6.0 + 7.0 * turned**4 / 360.0, abs=2e-3)

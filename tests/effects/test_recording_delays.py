@@ -9,9 +9,10 @@ import pytest
 from numpy.testing import assert_allclose
 
 from scara_ident.effects import Member
+from scara_ident.effects.filters.position_filter import PositionFilter
+from scara_ident.effects.filters.torque_filter import TorqueFilter
 from scara_ident.effects.measurement import TimeDelay
 from scara_ident.effects.recording_delays import MAX_RECORDINGS, DelayOfEachRecording
-from scara_ident.effects.torque_filter import TorqueFilter
 from scara_ident.estimation.run_variation import MIN_RUNS
 from scara_ident.robot.robot import load_robot
 from tests.effects.scenes import columns, moving, scene_of
@@ -93,7 +94,8 @@ def test_of_what_is_late_in_all_recordings_the_rest_of_a_filter_may_be_left():
         effect.leaves(here, ARM, delays) for effect, delays in ((TimeDelay(), np.array([-0.018])), (EFFECT, late))
     )
     assert one is not None and all_ is not None
-    assert one[:2] == all_[:2] and one[2] == pytest.approx(all_[2])
+    assert one == (PositionFilter(0.018), ARM, pytest.approx(all_[2]))
+    assert all_[:2] == (PositionFilter(pytest.approx(0.018)), ARM)
     assert EFFECT.leaves(here, ARM, late + np.array([0.0, 0.02, 0.0])) is None
     # A rigid UR5 whose torque lagged by 12 ms had delays of each recording too, 11.8 ms in all, and nothing was left of them.
     filtered = EFFECT.leaves(here, ARM, -late)

@@ -11,7 +11,7 @@ import pytest
 from scara_ident.diagnosis import Unexplained
 from scara_ident.diagnosis.candidates.candidates import Candidate
 from scara_ident.effects import Member
-from scara_ident.effects.torque_filter import TorqueFilter
+from scara_ident.effects.filters.torque_filter import TorqueFilter
 from scara_ident.errors import UsageError
 from scara_ident.files import plain
 from scara_ident.inquiry.questions import (

@@ -12,6 +12,7 @@ from itertools import chain
 import numpy as np
 from numpy.typing import NDArray
 
+from scara_ident.diagnosis.candidates.candidates import Candidate
 from scara_ident.diagnosis.checks.instants import with_instants_of_each
 from scara_ident.diagnosis.checks.other_minima import as_good, widened
 from scara_ident.diagnosis.checks.same_errors import same
@@ -78,9 +79,11 @@ def _places(step: SelectionStep, own: PhysicalParameters) -> NDArray[np.intp]:
 
 
 def _beside_rest(step: SelectionStep) -> Iterator[SelectionStep]:
-    """Give the model with what may be left of a correction, which is in all recordings and in no parameter of an arm."""
-    if step.rest is not None:
-        yield tune(replace(step, chosen=(*step.chosen, step.rest)))
+    """Give the model with what may be left of a correction, or what imitates that; neither is a property of the arm."""
+    rests = [item for item in step.chosen if item.effect.after_correction]
+    imitations = [Candidate(*one) for item in rests for one in item.effect.distinguished_from(step.scene, item.member)]
+    beside = (imitations, [] if step.rest is None else [step.rest])
+    yield from (tune(replace(step, chosen=(*step.chosen, *added))) for added in beside if added)
 
 
 def _as_good(step: SelectionStep, place: int) -> Iterator[SelectionStep]:

@@ -23,6 +23,7 @@ from scara_ident.simulation.effects.sensors import (
     EncoderEccentricity,
     JointZero,
     OffsetDrift,
+    PositionFilter,
     TimeDelay,
     TorqueFilter,
     TorqueGainMismatch,
@@ -55,7 +56,7 @@ CATALOGUE: tuple[type[Effect], ...] = (
     Vibration,
 )
 # What an arm may have or meet beside them.
-OTHERS: tuple[type[Effect], ...] = (Push, Payload, CoupledShaft, JointZero, SmoothCoulomb, TorqueFilter)
+OTHERS: tuple[type[Effect], ...] = (Push, Payload, CoupledShaft, JointZero, SmoothCoulomb, TorqueFilter, PositionFilter)
 UNLISTED: tuple[type[Effect], ...] = (UnlistedSignedSine, UnlistedSwingingViscous)
 EFFECTS: dict[str, type[Effect]] = {effect.name: effect for effect in (*CATALOGUE, *OTHERS, *UNLISTED)}
 

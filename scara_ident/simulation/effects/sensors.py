@@ -46,6 +46,25 @@ class TorqueFilter(Effect):
 
 
 @dataclass(frozen=True)
+class PositionFilter(Effect):
+    """Positions of all joints that are recorded after a low-pass filter of first order: ``time_constant dr/dt + r = q``.
+
+    The controller works with the positions before the filter.
+    """
+
+    name: ClassVar[str] = "position_filter"
+    units: ClassVar[dict[str, str]] = {"time_constant": "s"}
+    bounds: ClassVar[dict[str, tuple[float, float]]] = {"time_constant": (0.0, 1.0)}
+    whole_arm = "always"
+    time_constant: float = 0.01
+
+    def apply(self, arm: VirtualArm, draft: PlantDraft) -> None:
+        """Set the time constant."""
+        vacant(self, draft.position_lag)
+        draft.position_lag = self.time_constant
+
+
+@dataclass(frozen=True)
 class TorqueSensorNonlinearity(Effect):
     """A torque that is recorded as ``u + square u^2 + cubic u^3``."""
 

@@ -15,9 +15,9 @@ from scara_ident.diagnosis.fitting.nonlinear_fit import tune
 from scara_ident.diagnosis.testing.selection_step import SelectionStep
 from scara_ident.effects import Member, effects_named
 from scara_ident.effects.drift import WarmUp
+from scara_ident.effects.filters.position_filter import PositionFilter
 from scara_ident.effects.friction import AsymmetricFriction, Stribeck
 from scara_ident.effects.gear import TransmissionLoss
-from scara_ident.effects.position_filter import PositionFilter
 from scara_ident.paper import table5_parameters
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import load_robot

@@ -18,7 +18,7 @@ from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.diagnose import Diagnosis, diagnose
 from scara_ident.effects import Coefficient, Effect, Member, Scene, Signals, effects_named
 from scara_ident.effects.elasticity import JointElasticity
-from scara_ident.effects.position_filter import PositionFilter
+from scara_ident.effects.filters.position_filter import PositionFilter
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import load_robot
 from scara_ident.simulation import parse_effect, simulate, virtual_arm
@@ -120,7 +120,9 @@ def test_only_what_leaves_a_rest_objects(soft: Diagnosis):
     (gear,) = (place for place, item in enumerate(step.chosen) if item.effect.name == "joint_elasticity")
     beside = step.without(gear)
     (decision,) = beside.judge([step.chosen[gear]])
-    assert beside.rest == Candidate(PositionFilter(), Member(None))
+    (delay,) = (item for item in soft.effects if item.effect == "time_delay")
+    late = -delay.parameters["delay"].value
+    assert beside.rest == Candidate(PositionFilter(pytest.approx(late, rel=1e-3)), Member(None))
     assert remainder_objection(beside, decision) is None
     assert remainder_objection(replace(beside, rest=None), decision) is None
     # A rest that does all that the gear does leaves nothing to it.

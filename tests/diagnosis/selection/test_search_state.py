@@ -16,10 +16,10 @@ from scara_ident.diagnosis.testing.selection_step import SelectionStep
 from scara_ident.diagnosis.testing.selection_step import observed as with_effects
 from scara_ident.effects import Member
 from scara_ident.effects.elasticity import JointElasticity
+from scara_ident.effects.filters.torque_filter import TorqueFilter
 from scara_ident.effects.friction import AsymmetricFriction
 from scara_ident.effects.measurement import TimeDelay, shifted
 from scara_ident.effects.position import Spring
-from scara_ident.effects.torque_filter import TorqueFilter
 from scara_ident.estimation import wls
 from scara_ident.estimation.run_offsets import rms_of
 from tests.diagnosis.made import complete, exact_runs, observed, with_torque

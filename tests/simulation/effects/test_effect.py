@@ -36,6 +36,7 @@ NOTHING = [
     fx.PayloadChange(mass=0.0, time=0.3),
     fx.TimeDelay(delay=0.0),
     fx.TorqueFilter(time_constant=0.0),
+    fx.PositionFilter(time_constant=0.0),
     fx.TorqueSensorNonlinearity(cubic=0.0),
     fx.TorqueSensorNonlinearity(cubic=0.0, square=0.0),
     fx.TorqueGainMismatch(ratio=1.0),
@@ -75,6 +76,10 @@ def test_every_effect_runs_with_its_own_sizes_and_is_felt(urdf: str | None) -> N
         result = simulate(arm, motion, effects=[effect])
         assert "nan" not in str(result.effects[0].as_dict()["parameters"]), name
         changed = np.abs(result.recording.effort - plain.recording.effort).max(axis=1) / arm.torque_scale
+        if kind is fx.PositionFilter:
+            # The controller does not have it.
+            assert changed.max() == 0.0
+            changed = np.abs(result.recording.position - plain.recording.position).max(axis=1)
         assert 1e-4 < changed.max() < (5.0 if kind is fx.Push else 1.5), name
 
 

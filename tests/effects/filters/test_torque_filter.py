@@ -12,9 +12,9 @@ from scipy.signal import bilinear, lfilter
 from scara_ident.arrays import Array
 from scara_ident.diagnosis import diagnose
 from scara_ident.effects import Member, Signals
+from scara_ident.effects.filters.torque_filter import TorqueFilter
 from scara_ident.effects.following import predicted_slopes
 from scara_ident.effects.measurement import shifted
-from scara_ident.effects.torque_filter import LAWS, TorqueFilter
 from scara_ident.model.model import build_model
 from scara_ident.robot.robot import load_robot
 from scara_ident.simulation import parse_effect, simulate, virtual_arm
@@ -97,19 +97,6 @@ def test_columns_are_those_of_the_laws_and_follow_the_estimate():
         assert found == pytest.approx(value @ own[joint], abs=1e-9 * np.max(np.abs(own)))
     assert effect.of_torque(signals, ALL, signals.predicted) == pytest.approx(own)
     assert effect.members(scene) == ()
-
-
-def test_moments_of_the_laws_are_those_of_their_impulse_responses():
-    time = np.arange(0.0, 40.0, 1e-3)
-    for name, response, variance, third in [
-        ("first_order", np.exp(-time), 1.0, 2.0),
-        ("second_order", 2.0 * np.exp(-time) * np.sin(time), 0.0, -1.0),
-    ]:
-        moment = [float(np.sum(response * (time - 1.0) ** k) * 1e-3) for k in range(4)]
-        assert moment == pytest.approx([1.0, 0.0, variance, third], abs=2e-3)
-        # The series of the transfer function without its delay.
-        x = 0.05j
-        assert np.exp(x) * LAWS[name](x) == pytest.approx(1.0 + x**2 * variance / 2.0 - x**3 * third / 6.0, abs=3e-6)
 
 
 @pytest.mark.slow

@@ -1,0 +1,85 @@
+"""A filter of the positions: the part that is left after its delay was corrected."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from scara_ident.arrays import Array
+from scara_ident.effects.filters.filter_rest import FilterRest
+from scara_ident.effects.following import EstimateSlopes
+from scara_ident.effects.friction import friction_places
+from scara_ident.effects.parameters import Member
+from scara_ident.effects.signals import Signals
+from scara_ident.motion.low_pass import HIGHEST_CUT
+from scara_ident.motion.motion import Motion
+
+
+@dataclass(frozen=True)
+class PositionFilter(FilterRest):
+    """Positions of all joints after one low-pass filter, in addition to its delay.
+
+    The torque follows from the positions before the filter, which are the recorded ones after its inverse. With the transfer
+    function H of the filter and its delay T, which `TimeDelay` corrects, a column is
+    ``Y(q + d, v + d', a + d'') theta - Y(q, v, a) theta`` with ``d = (exp(-s T) / H(s) - 1) q``. There is one for each of two filters
+    with the same delay: a low-pass of first order and a Butterworth filter of second order; it is exact for this filter alone.
+    To third order in s any filter is a combination of both, see `FilterRest`. A pure delay has no part of either.
+
+    Coulomb friction jumps where the velocity before the filter turns. The links behind
+    elastic gears follow from the same positions, so what they change of the torque is filtered too. An elastic gear of one
+    joint, whose link lags by its load, does to the torque what a filter does by all loads.
+    """
+
+    name = "position_filter"
+    summary = "positions that are recorded after a low-pass filter"
+    beside_together = True
+    smooth = True
+    inverse = True
+    experiment = "log the positions of the encoders without a filter"
+
+    def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
+        """Return the change of the torque of bodies, viscous friction and links that lag, for each law."""
+        value, active = signals.scene.value, signals.scene.model.active
+        lagging = self.rest(signals.of_together, signals.motion.rate, _cut(signals))
+        for changed, left in zip(self._changed(signals), lagging, strict=True):
+            yield left + np.array([value[own] @ rows for own, rows in zip(active, changed, strict=True)])
+
+    def estimate_slopes(self, signals: Signals, member: Member, value: Array) -> EstimateSlopes:
+        """Return those of the base model's columns: how links lag by other bodies is small beside it."""
+        laws = list(self._changed(signals))
+        return {
+            joint: (signals.scene.model.active[joint], np.tensordot(value, [law[joint] for law in laws], axes=1))
+            for joint in self.rows(signals.scene, member)
+        }
+
+    def _changed(self, signals: Signals) -> Iterator[list[Array]]:
+        """Give for each law the change of the base model's columns, as `Signals.columns`."""
+        motion, scene = signals.motion, signals.scene
+        parts = (motion.q, motion.v, motion.a)
+        coulomb = [friction_places(scene, joint).get(0, -1) for joint in range(scene.robot.n)]
+        for changes in zip(*(self.rest(part, motion.rate, _cut(signals)) for part in parts), strict=True):
+            q, v, a = (part + change for part, change in zip(parts, changes, strict=True))
+            moved = replace(motion, q=q, v=v, a=a, torque=None)
+            turned = scene.robot.drive_sign[:, None] * (_mean_sign(moved) - _mean_sign(motion))
+            there = scene.model.joint_columns(moved)
+            yield [
+                np.where((own == place)[:, None], turn, new - old)
+                for own, place, turn, new, old in zip(
+                    scene.model.active, coulomb, turned, there, signals.columns, strict=True
+                )
+            ]
+
+
+def _mean_sign(motion: Motion) -> Array:
+    """Return the mean sign of the velocity from half a sample before to half a sample after each, shape (n, N).
+
+    A turn moves by less than a sample, which the sign at the samples does not show.
+    """
+    change = np.abs(motion.a) / (2.0 * motion.rate)
+    return np.clip(motion.v / np.maximum(change, np.finfo(float).tiny), -1.0, 1.0)
+
+
+def _cut(signals: Signals) -> float:
+    return signals.derivative_cut or HIGHEST_CUT * signals.motion.rate
