@@ -18,7 +18,7 @@ from scara_ident.effects.position_filter import FILTERED, PositionFilter
 from scara_ident.effects.scale_groups import scale_groups
 from scara_ident.effects.signals import Scene, Signals
 from scara_ident.effects.torque_filter import TorqueFilter
-from scara_ident.motion.low_pass import differentiate
+from scara_ident.motion.low_pass import derivative
 from scara_ident.motion.motion import UNIFORM_TOLERANCE
 from scara_ident.motion.spline import cubic_spline
 from scara_ident.motion.transfer import through
@@ -317,7 +317,7 @@ class LateTurn(Effect):
 
 def lacking(signals: Signals, torque: Array) -> Array:
     """Return what a torque (k, N) lacks for each second that it is late, ``-du/dt``."""
-    return -differentiate(torque, signals.motion.rate, signals.derivative_cut)[1]
+    return -derivative(torque, signals.motion.rate, signals.derivative_cut, 1)
 
 
 def shifted(recording: Recording, delay: float, joints: Sequence[int] | None = None) -> Recording:
