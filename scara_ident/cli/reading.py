@@ -12,8 +12,10 @@ if TYPE_CHECKING:
     from scara_ident.recording.apart import Usable
     from scara_ident.robot.robot import Robot
 
+# What the audit of a recording needs too: loaded before, it is loaded once for both processes.
+BEFORE = ("scipy.special",)
 # What all work on recordings loads sooner or later.
-LATER = ("scipy.fft", "scipy.linalg", "scipy.special")
+LATER = ("scipy.fft", "scipy.linalg")
 
 
 @contextmanager
@@ -21,6 +23,8 @@ def read_beside(arm: Robot, *each: Sequence[Path | str]) -> Iterator[Callable[[]
     """Read recordings in another process while what works on them is loaded; yields what waits for them, see `usable_beside`."""
     from scara_ident.recording.apart import usable_beside
 
+    for name in BEFORE:
+        import_module(name)
     with usable_beside(arm, *each) as wanted:
         for name in LATER:
             import_module(name)

@@ -18,7 +18,7 @@ from scara_ident.estimation.information import Information, merge, weighted
 from scara_ident.estimation.observations import Observations, informations
 from scara_ident.estimation.sample_columns import few_enough
 from scara_ident.manners import listed
-from scara_ident.motion.low_pass import differentiate
+from scara_ident.motion.low_pass import derivative
 from scara_ident.motion.position_noise import NoiseSizes, forget_stepless, noise_sizes, noisier
 from scara_ident.motion.prepared import PreparedData, PreparedRecording
 from scara_ident.threads import side_by_side
@@ -179,7 +179,7 @@ def noise_shares(data: PreparedData, derivatives: int = 0) -> list[float]:
             power = 2.0 * noise / part.rate * (2.0 * np.pi * band) ** (2 * order) * band / (2.0 * order + 1.0)
             motion = part.motion.a[joint]
             if derivatives:
-                motion = differentiate(motion, part.rate, band)[derivatives]
+                motion = derivative(motion, part.rate, band, derivatives)
             whole = float(np.mean(motion[part.used[joint]] ** 2))
             found.append(power / whole if whole > 0.0 else 0.0)
         return found

@@ -201,6 +201,24 @@ def differentiate(signal: Array, rate: float, cut: float | None) -> tuple[Array,
     return smooth, first, second
 
 
+def derivative(signal: Array, rate: float, cut: float | None, order: int) -> Array:
+    """Return one of the results of `differentiate`, in less than half the time that all three take.
+
+    Parameters
+    ----------
+    signal : ndarray, shape (..., N)
+    rate, cut : float
+        As for `differentiate`.
+    order : {0, 1, 2}
+        0 is the filtered signal itself.
+
+    Returns
+    -------
+    ndarray, shape (..., N)
+    """
+    return np.asarray(_filtered(signal, rate, cut, (order,))[0])
+
+
 def _filtered(
     signal: Array, rate: float, cut: float | None, orders: Sequence[int], highest: float = np.inf, step: int = 1
 ) -> Array:

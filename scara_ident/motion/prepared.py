@@ -220,11 +220,15 @@ class PreparedStretch:
         every : int, optional
             The signals are given at every so many samples, 1 or `decimation`.
         """
+        acting = np.any(signals, axis=1)
+        if not np.all(acting):
+            # What does not act here, as on other joints or in other recordings, is not filtered.
+            found = np.zeros((len(signals), len(self.kept[joint])))
+            found[acting] = self.rows(joint, signals[acting], every)
+            return found
         step, band, fade = self.steps[joint], self.bands[joint], self.fade[joint, ::every]
         rows = low_pass_every(signals, self.rate / every, band, step // every, fade)
-        rows = rows.take(self.kept[joint] // step, axis=1)
-        rows *= np.sqrt(step)
-        return rows
+        return np.asarray(rows.take(self.kept[joint] // step, axis=1) * np.sqrt(step))
 
     def rows_of(self, signals: Sequence[tuple[int, Array]], every: int = 1) -> list[Array]:
         """Return the result of `rows` for single signals, each given with its joint; those of a joint are filtered together."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scara_ident.motion.low_pass import differentiate
+from scara_ident.motion.low_pass import derivative
 from scara_ident.motion.motion import Stretch
 from scara_ident.recording.recording import Recording
 
@@ -157,7 +157,7 @@ def audit_velocity(recording: Recording, part: Stretch) -> tuple[VelocityAudit, 
             continue
         recorded = np.interp(part.time, recording.time[inside], recording.velocity[j][inside])
         _, v, a = part.filtered(j, cut)
-        smooth = differentiate(recorded, part.rate, cut)[0]
+        smooth = derivative(recorded, part.rate, cut, 0)
         scale = float(np.sqrt(np.mean(smooth**2)))
         if float(np.max(np.abs(v))) < 1e-4 * max(1.0, float(np.max(np.abs(recorded)))):
             continue

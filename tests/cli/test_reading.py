@@ -20,6 +20,23 @@ def test_nothing_is_read_where_nothing_is_named() -> None:
 
 
 @pytest.mark.slow
+def test_what_both_processes_need_is_loaded_once_before_there_are_two() -> None:
+    program = f"""
+import sys
+from scara_ident.cli.reading import read_beside
+from scara_ident.recording import apart
+from scara_ident.robot.robot import load_robot
+
+beside, before = apart.usable_beside, []
+apart.usable_beside = lambda *given: before.extend(sys.modules) or beside(*given)
+with read_beside(load_robot(), []):
+    print(all(name in before for name in {reading.BEFORE!r}))
+"""
+    done = subprocess.run([sys.executable, "-c", program], cwd=Path(ROOT), capture_output=True, text=True, check=True)
+    assert done.stdout == "True\n"
+
+
+@pytest.mark.slow
 def test_what_is_loaded_meanwhile_is_loaded_when_recordings_are_waited_for() -> None:
     program = f"""
 import sys
@@ -27,7 +44,7 @@ from scara_ident.cli.reading import read_beside
 from scara_ident.robot.robot import load_robot
 
 with read_beside(load_robot(), []):
-    print(all(name in sys.modules for name in {reading.LATER!r}))
+    print(all(name in sys.modules for name in {(*reading.BEFORE, *reading.LATER)!r}))
 """
     done = subprocess.run([sys.executable, "-c", program], cwd=Path(ROOT), capture_output=True, text=True, check=True)
     assert done.stdout == "True\n"

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from scara_ident.motion.low_pass import differentiate, low_pass, low_pass_every, noise_share, removed_share
+from scara_ident.motion.low_pass import derivative, differentiate, low_pass, low_pass_every, noise_share, removed_share
 from scara_ident.motion.prepared import row_step
 from tests.motion.test_motion import RATE, sine
 
@@ -45,6 +45,19 @@ def test_two_periods_of_the_cut_off_from_the_ends_the_error_is_small():
         for found, exact, error in zip(made, sine(1.0, time), (1e-5, 2e-4, 2e-3), strict=True):
             ends = int(2 * RATE / cut)
             assert_allclose(found[0, ends:-ends], exact[ends:-ends], rtol=0, atol=error * np.max(np.abs(exact)))
+
+
+@pytest.mark.parametrize("cut", [None, 20.0])
+def test_one_derivative_is_that_of_all_three_and_is_transformed_back_alone(monkeypatch: pytest.MonkeyPatch, cut):
+    signal = np.random.default_rng(0).standard_normal((2, 1000))
+    every = differentiate(signal, RATE, cut)
+    transform, back = np.fft.irfft, list[int]()
+    monkeypatch.setattr(
+        np.fft, "irfft", lambda spectra, *given, **more: back.append(len(spectra)) or transform(spectra, *given, **more)
+    )
+    for order, expected in enumerate(every):
+        assert_array_equal(derivative(signal, RATE, cut, order), expected)
+    assert back == [1, 1, 1]
 
 
 @pytest.mark.parametrize("count", [2001, 2000])

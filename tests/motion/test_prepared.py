@@ -14,7 +14,7 @@ import scara_ident.motion.prepared
 from scara_ident.errors import RecordingError, UsageError
 from scara_ident.identification.identify import identify
 from scara_ident.model.model import TorqueModel
-from scara_ident.motion.low_pass import low_pass
+from scara_ident.motion.low_pass import low_pass, low_pass_every
 from scara_ident.motion.motion import stretches
 from scara_ident.motion.prepared import BLOCK_SECONDS, SMOOTH_PER_PERIOD, PreparedStretch, prepare, row_step
 from scara_ident.recording.audit import Finding
@@ -282,6 +282,24 @@ def test_signals_of_several_joints_pass_the_filter_together_as_alone(run: Record
     for joint, signal, rows in zip(joints, signals, found, strict=True):
         assert_allclose(rows, part.rows(joint, signal[None])[0], rtol=0, atol=1e-13)
     assert part.rows_of([]) == []
+
+
+def test_what_does_not_act_has_rows_of_zero_and_is_not_filtered(monkeypatch: pytest.MonkeyPatch, run: Recording):
+    part, filtered = only(run), list[int]()
+
+    def counted(signals: np.ndarray, *given: object) -> np.ndarray:
+        filtered.append(len(signals))
+        return low_pass_every(signals, *given)
+
+    signals = np.random.default_rng(4).standard_normal((4, part.samples))
+    alone = part.rows(0, signals[2:])
+    signals[:2] = 0.0
+    monkeypatch.setattr(scara_ident.motion.prepared, "low_pass_every", counted)
+    rows = part.rows(0, signals[[0, 2, 1, 3]])
+    assert sum(filtered) == 2
+    assert_array_equal(rows[[0, 2]], 0.0)
+    assert_allclose(rows[[1, 3]], alone, rtol=0, atol=1e-14)
+    assert part.rows(0, signals[:2]).shape == (2, len(part.kept[0]))
 
 
 def test_clipped_torque_is_left_out_of_its_joint_and_nothing_else(robot: Robot) -> None:

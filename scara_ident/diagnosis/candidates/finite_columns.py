@@ -14,8 +14,8 @@ MAX_COLUMN = 1e60
 
 def is_finite(columns: Array) -> bool:
     """Whether all of some columns are numbers that fits can take."""
-    # Not so either where the largest is NaN.
-    return bool(np.max(np.abs(columns), initial=0.0) <= MAX_COLUMN)
+    # Not so either where the largest is NaN. Without a copy of their sizes, for each column is looked at.
+    return bool(columns.max(initial=0.0) <= MAX_COLUMN and columns.min(initial=0.0) >= -MAX_COLUMN)
 
 
 def finite_or_zero(columns: Array) -> Array:

@@ -222,7 +222,10 @@ def with_estimate_slopes(step: SelectionStep, state: Linearised) -> Linearised:
     scene, joints = step.scene, state.joints
     for candidate, place in zip(step.chosen, state.places, strict=True):
         if candidate.effect.follows_estimate and candidate.effect.tie(scene, candidate.member) is None:
-            joints = _with_slopes(joints, step.columns.estimate_slopes(scene, candidate, state.value[place]), 0, scene)
+            value = state.value[place]
+            # The torque of what was taken out of the data is zero, whatever the parameters are.
+            slopes = step.columns.estimate_slopes(scene, candidate, value) if np.any(value) else {}
+            joints = _with_slopes(joints, slopes, 0, scene)
     if joints is state.joints:
         return state
     information = _pooled(joints, state.information.parameters, step.weights, step.offsets)

@@ -8,7 +8,7 @@ from scara_ident.arrays import Array
 from scara_ident.effects.effect import Effect
 from scara_ident.effects.parameters import Coefficient, Member
 from scara_ident.effects.signals import Signals
-from scara_ident.motion.low_pass import differentiate
+from scara_ident.motion.low_pass import derivative
 
 
 class LateTurn(Effect):
@@ -31,4 +31,4 @@ class LateTurn(Effect):
 
 def lacking(signals: Signals, torque: Array) -> Array:
     """Return what a torque (k, N) lacks for each second that it is late, ``-du/dt``."""
-    return -differentiate(torque, signals.motion.rate, signals.derivative_cut)[1]
+    return -derivative(torque, signals.motion.rate, signals.derivative_cut, 1)

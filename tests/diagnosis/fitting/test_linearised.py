@@ -8,14 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scara_ident.diagnosis.candidates.candidates import Candidate, with_columns
+from scara_ident.diagnosis.candidates.candidates import Candidate, CandidateColumns, with_columns
 from scara_ident.diagnosis.fitting.linearised import with_estimate_slopes
 from scara_ident.diagnosis.fitting.trust_region import RADIUS_TOLERANCE
 from scara_ident.diagnosis.testing.selection_step import SelectionStep
 from scara_ident.effects import Member
 from scara_ident.effects.friction import Stribeck
 from scara_ident.effects.gear import TransmissionLoss
-from scara_ident.effects.measurement import TorqueSensorNonlinearity
+from scara_ident.effects.measurement import TimeDelay, TorqueSensorNonlinearity
 from scara_ident.estimation.information import merge
 from scara_ident.estimation.joint_rows import JointRows
 from tests.diagnosis.fitting.test_nonlinear_fit import WEIGHTS, linear, loss_runs
@@ -99,6 +99,18 @@ def test_where_columns_follow_the_base_model_its_derivatives_are_those_of_the_pr
     alone = replace(step, chosen=(friction,))
     as_it_was = linear(alone)
     assert with_estimate_slopes(alone, as_it_was) is as_it_was
+
+
+def test_what_was_taken_out_of_the_data_has_no_torque_that_the_base_model_could_change(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    step = step_beside(loss_runs(0.3, 1.0)[:1], (Candidate(TimeDelay(), Member(None)),), WEIGHTS)
+    plain = linear(step)
+    asked = list[Candidate]()
+    monkeypatch.setattr(CandidateColumns, "estimate_slopes", lambda *given: asked.append(given[2]) or {})
+    state = with_estimate_slopes(step, plain)
+    assert not asked and not np.any(plain.value[plain.places[0]])
+    assert np.array_equal(state.information.factor, plain.information.factor)
 
 
 def test_a_parameter_that_is_the_coefficient_is_one_with_it() -> None:
