@@ -14,6 +14,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
+
 from scara_ident.diagnosis import diagnose
 from scara_ident.errors import ScaraIdentError
 from scara_ident.excitation.design import Design, design_excitation
@@ -35,6 +37,8 @@ from scara_ident.robot.robot import Robot
 State = Literal["record", "settled", "unanswered"]
 # A motion is worth recording if it brings the answers so many times further apart than they are.
 WORTHWHILE_RATIO = 1.5
+# A motion is advised that lasts up to so many times as long as the one that was designed; beyond, nobody would record it.
+MAX_TIMES_LONGER = 10.0
 # How often recordings are asked for to answer one question, and to lower what they hardly show.
 MAX_REQUESTS, MAX_LIMIT_REQUESTS = 2, 1
 NOTE = "ask.json"
@@ -267,9 +271,9 @@ def _designed(folder: Path, settings: Settings, recordings: Sequence[Path], aske
     worthwhile = worth_recording(design.tells)
     if not worthwhile:
         _removed(folder)
-        others = "; ".join(f"{item.question.text}: {item.remedy}" for item in design.tells)
-        words = f"No motion within the limits answers the open questions. These experiments would: {others}."
-        return _note(folder, replace(asked, state="unanswered", words=words))
+        return _note(
+            folder, replace(asked, state="unanswered", words=unanswered_words(design.tells, settings.duration))
+        )
     _written(folder, design)
     write_json(folder / "diagnosis.json", _promised(content, design.tells))
     words = (
@@ -322,6 +326,32 @@ def worth_recording(tells: Sequence[ExpectedAnswer]) -> list[ExpectedAnswer]:
         if item.after >= max(SURE_STANDARD_ERRORS, WORTHWHILE_RATIO * item.before)
         and not 0 < len(item.question.suspects) == len(item.unshown)
     ]
+
+
+def unanswered_words(tells: Sequence[ExpectedAnswer], duration: float) -> str:
+    """Say what would answer the questions that no motion of a duration, s, does: a longer one, or another experiment.
+
+    What a motion tells adds up over its time, so the square of the standard errors between two answers grows in proportion.
+    That another motion be recorded is no advice where the best one was designed and does not tell.
+    """
+    longer, never, others = [], [], []
+    for item in tells:
+        gained = item.after**2 - item.before**2
+        times = (SURE_STANDARD_ERRORS**2 - item.before**2) / gained if gained > 0.0 else np.inf
+        if not item.hidden and 1.0 < times <= MAX_TIMES_LONGER:
+            longer.append(f"{item.question.text} with --duration {np.ceil(times * duration):g}")
+        elif item.question.kind == "parameter":
+            never.append(item.question.text)
+        else:
+            others.append(f"{item.question.text}: {item.remedy}")
+    words = [f"No motion of {duration:g} s within the limits answers the open questions."]
+    if longer:
+        words.append(f"A longer one is expected to answer: {'; '.join(longer)}.")
+    if never:
+        words.append(f"One {MAX_TIMES_LONGER:g} times as long would not determine: {', '.join(never)}.")
+    if others:
+        words.append(f"These experiments would: {'; '.join(others)}.")
+    return " ".join(words)
 
 
 def _promised(content: Mapping[str, Any], tells: Sequence[ExpectedAnswer]) -> dict[str, Any]:

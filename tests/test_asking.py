@@ -9,7 +9,17 @@ from pathlib import Path
 import pytest
 
 from scara_ident import asking
-from scara_ident.asking import Asked, Settings, ask, key_of, progress_in_words, read_asked, still_open, worth_recording
+from scara_ident.asking import (
+    Asked,
+    Settings,
+    ask,
+    key_of,
+    progress_in_words,
+    read_asked,
+    still_open,
+    unanswered_words,
+    worth_recording,
+)
 from scara_ident.errors import ScaraIdentError
 from scara_ident.excitation import Effort, limits_of
 from scara_ident.excitation.promise import ExpectedAnswer, Shown
@@ -143,10 +153,24 @@ def test_where_no_motion_tells_it_says_the_experiment_of_what_stays_hidden(
     found = ask(folder, QUICK)
     assert found.state == "unanswered"
     assert found.words == (
-        f"No motion within the limits answers the open questions. These experiments would: what these hardly show: {faint.remedy}."
+        f"No motion of {QUICK.duration:g} s within the limits answers the open questions. "
+        f"These experiments would: what these hardly show: {faint.remedy}."
     )
     assert general.suspects[0].candidate.effect.experiment in faint.remedy
     assert general.experiment not in faint.remedy
+
+
+def test_where_a_longer_motion_tells_it_says_how_long_and_does_not_send_for_what_was_designed():
+    first = questions(open_diagnosis())[0]
+    one, other = (Question("parameter", f"value of {name}", parameter=name, size=1.0) for name in "ab")
+    # The square of the standard errors grows with the time: (25 - 1) / (9 - 1) = 3 times as long.
+    told = [ExpectedAnswer(one, 1.0, 3.0), ExpectedAnswer(other, 0.2, 0.8), ExpectedAnswer(first, 1.0, 1.0)]
+    assert unanswered_words(told, 15.0) == (
+        "No motion of 15 s within the limits answers the open questions. "
+        "A longer one is expected to answer: value of a with --duration 45. "
+        "One 10 times as long would not determine: value of b. "
+        f"These experiments would: {first.text}: {first.experiment}."
+    )
 
 
 def test_where_nothing_is_open_it_says_so_and_no_motion_is_left(folder: Path, monkeypatch: pytest.MonkeyPatch):

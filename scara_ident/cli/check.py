@@ -79,5 +79,6 @@ def check(
             write_json(place / "check.json", content)
         console.written(output, "check.json", "report.html", "check.png")
     if found.broken:
-        said = content["summary"][0]
-        raise ScaraIdentError(f"{trajectory}: {said[0].lower()}{said[1:].rstrip('.')}; {content['summary'][1]}")
+        # Two sentences as one line of an error.
+        said = (f"{each[0].lower()}{each[1:].rstrip('.')}" for each in content["summary"][:2])
+        raise ScaraIdentError(f"{trajectory}: {'; '.join(said)}")

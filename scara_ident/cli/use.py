@@ -57,9 +57,12 @@ def use(
     content = use_dict(found)
     console = result_console(content, json)
     console.note(useless)
-    rows = table("rms tracking error", "feed-forward", *arm.joints, right=arm.joints)
-    for name, errors in content["tracking"].items():
-        rows.add_row(WORDS[name], *(f"{errors[joint]:.3g} {content['units'][joint]}" for joint in arm.joints))
+    arms = tuple(WORDS[name] for name in content["tracking"])
+    # A row a joint: seven joints side by side do not fit a line.
+    rows = table("rms tracking error", "joint", *arms, "unit", right=arms)
+    for joint in arm.joints:
+        errors = (f"{of_arm[joint]:.3g}" for of_arm in content["tracking"].values())
+        rows.add_row(joint, *errors, content["units"][joint])
     console.print(rows)
     console.say(content["summary"])
     if output is not None:

@@ -24,6 +24,7 @@ from scara_ident.model.urdf_values import urdf_values
 from scara_ident.report.diagnosis_words import headline_and_details
 from scara_ident.report.identification import bias_of
 from scara_ident.report.left_out import left_out_share
+from scara_ident.report.moved import moved
 
 
 def diagnosis_dict(diagnosis: Diagnosis, worth: Mapping[str, Any] | None = None) -> dict[str, Any]:
@@ -241,17 +242,3 @@ def _before_after(diagnosis: Diagnosis, old: Observations, new: Observations) ->
         if differ:
             result[f"{name}_own_offset"] = {joint: error.rms_own_offset if error else None for joint, error in pairs}
     return result
-
-
-def moved(diagnosis: Diagnosis) -> list[dict[str, Any]]:
-    """Return the parameters of the base model that moved by over three standard deviations."""
-    before, after, found = diagnosis.before, diagnosis.after, []
-    for k, (column, stated) in enumerate(zip(before.model.columns, urdf_values(before.model), strict=True)):
-        change = float(after.value[k] - before.value[k])
-        std = float(after.std[k])
-        if diagnosis.effects and std > 0.0 and abs(change) > 3.0 * std:
-            found.append(
-                {"name": column.name, "urdf": stated, "before": before.value[k], "after": after.value[k]}
-                | {"in_std": change / std}
-            )
-    return sorted(found, key=lambda item: -abs(item["in_std"]))

@@ -19,6 +19,7 @@ from scara_ident.inquiry.next_steps import next_steps
 from scara_ident.model.terms.friction import Friction
 from scara_ident.report.doubts import doubts
 from scara_ident.report.identification import bias_said
+from scara_ident.report.moved import away_from_urdf
 from scara_ident.robot.rotors import GUESS_FACTOR
 
 # An uncertainty below this factor is written as a standard deviation.
@@ -59,6 +60,8 @@ def _others(diagnosis: Diagnosis) -> list[str]:
         )
     if diagnosis.effects:
         found += _errors(diagnosis)
+        away = away_from_urdf(diagnosis)
+        found += [] if away is None else [away]
     for guess in diagnosis.tentative:
         where = f" on {guess.joint}" if guess.joint else ""
         gain = f"would remove {max(guess.gain, 0.0):.0%} of the squared residual"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -18,11 +18,12 @@ def reductions(
     names: Sequence[str], joints: Sequence[JointDescription], urdf: Path, tree: ElementTree.Element
 ) -> Array:
     """Return the reduction of each joint, shape (n,): the description's, else the URDF's, else 1."""
-    from_urdf = _actuator_numbers(tree, urdf, ("mechanicalReduction", "mechanical_reduction"))
+    given = [joint.reduction for joint in joints]
+    asked = _not_given(names, given)
+    from_urdf = _actuator_numbers(tree, urdf, ("mechanicalReduction", "mechanical_reduction"), "reduction", asked)
     for name, value in from_urdf.items():
         if value == 0.0:
             raise RobotError(f"{urdf}: transmission of {name}: mechanicalReduction is 0; expected another number")
-    given = [joint.reduction for joint in joints]
     return np.array([_first(value, from_urdf.get(name), 1.0) for name, value in zip(names, given, strict=True)])
 
 
@@ -30,11 +31,11 @@ def rotor_inertias(
     names: Sequence[str], joints: Sequence[JointDescription], urdf: Path, tree: ElementTree.Element
 ) -> Array:
     """Return the rotor inertia of each joint, kg m^2 at the motor, shape (n,): NaN where none is stated."""
-    from_urdf = _actuator_numbers(tree, urdf, ("rotorInertia",))
+    given = [joint.rotor_inertia for joint in joints]
+    from_urdf = _actuator_numbers(tree, urdf, ("rotorInertia",), "rotor_inertia", _not_given(names, given))
     for name, value in from_urdf.items():
         if value < 0.0:
             raise RobotError(f"{urdf}: transmission of {name}: rotorInertia is {value:g}; expected 0 or more, kg m^2")
-    given = [joint.rotor_inertia for joint in joints]
     return np.array([_first(value, from_urdf.get(name), np.nan) for name, value in zip(names, given, strict=True)])
 
 
@@ -42,8 +43,14 @@ def _first(*values: float | None) -> float:
     return float(next(value for value in values if value is not None))
 
 
-def _actuator_numbers(tree: ElementTree.Element, urdf: Path, tags: Sequence[str]) -> dict[str, float]:
-    """Read a number from the transmission of every joint that has one.
+def _not_given(names: Sequence[str], given: Sequence[float | None]) -> set[str]:
+    return {name for name, value in zip(names, given, strict=True) if value is None}
+
+
+def _actuator_numbers(
+    tree: ElementTree.Element, urdf: Path, tags: Sequence[str], key: str, asked: Collection[str]
+) -> dict[str, float]:
+    """Read a number from the transmission of every joint of ``asked`` that has one; ``key`` is what states it instead.
 
     yourdfpy 0.0.60 parses the element but loses its text (an element without children is false), so the
     file is read here.
@@ -55,8 +62,13 @@ def _actuator_numbers(tree: ElementTree.Element, urdf: Path, tags: Sequence[str]
         if not texts:
             continue
         for name in names:
+            if name not in asked:
+                continue
             value = finite_number(texts[0])
             if value is None:
-                raise RobotError(f"{urdf}: transmission of {name}: {tags[0]} is {texts[0]!r}; expected a number")
+                raise RobotError(
+                    f"{urdf}: transmission of {name}: {tags[0]} is {texts[0]!r}; expected a number: correct "
+                    f"or remove it, or state {key} of {name} in robot.yaml"
+                )
             found[name] = value
     return found

@@ -223,6 +223,11 @@ def sentences(found: ContactFindings) -> list[str]:
             f"That is less than the {1.0 / alarm.rate:.3g} h in which one false alarm is expected: the rate is "
             f"extrapolated and therefore less certain; record more motion without contact."
         )
+    without = [each for each in found.contacts if each.force is None]
+    if any(not each.estimate.at_tool for each in without):
+        said.append("Where no force is given, the contact is on the named link or farther out.")
+    if any(each.estimate.at_tool for each in without):
+        said.append("Near a singular pose the force on the tool is not determined.")
     if found.observer.external.left_out:
         said.append(
             f"Left out, because they need more than position and velocity: {', '.join(found.observer.external.left_out)}."

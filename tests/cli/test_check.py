@@ -37,6 +37,8 @@ def test_one_that_cannot_is_exit_status_1_with_its_results(capfd, folder: Path, 
     assert "It cannot be run: torque of joint2 at " in out
     assert err.startswith(f"scara-ident: {folder / 'OJD_2.parquet'}: it cannot be run: torque of joint2 at ")
     assert err.count("\n") == 1
+    assert "; along the same path it can be run at " in err
+    assert not err.endswith(".\n")
     content = json.loads((tmp_path / "check.json").read_text())
     assert content["limited_by"]["kind"] == "torque"
     assert content["limited_by"]["margin"] < 0.0 < content["speed_share"] < 1.0

@@ -29,6 +29,9 @@ def test_the_command_writes_the_table_and_the_report(command, tmp_path: Path) ->
     answer = command("use", tmp_path / "diagnosis.json", "--trajectory", path, "--output", tmp_path / "out")
     assert answer.status == 0, answer.err
     told = json.loads((tmp_path / "out" / "use.json").read_text())
+    # A row a joint, which fits a line whatever the number of joints.
+    row = next(line.split() for line in answer.out.splitlines() if line.startswith("joint2"))
+    assert row == ["joint2", *(f"{errors['joint2']:.3g}" for errors in told["tracking"].values()), "rad"]
     assert set(told["tracking"]) == {"pid", "urdf", "identified", "effects"}
     page = (tmp_path / "out" / "report.html").read_text()
     assert "Feed-forward" in page

@@ -43,8 +43,20 @@ def test_the_description_wins_and_a_rotor_of_zero_is_a_statement():
 
 @pytest.mark.parametrize("text", ["", "fast", "nan", "inf"])
 def test_what_is_no_number_is_refused_with_joint_and_element(text: str):
-    with pytest.raises(RobotError, match=r"^arm\.urdf: transmission of j2: rotorInertia is .*expected a number$"):
+    with pytest.raises(
+        RobotError, match=r"^arm\.urdf: transmission of j2: rotorInertia is .*expected a number: correct or remove it"
+    ):
         rotor_inertias(NAMES, BARE, URDF, tree(("j2", f"<rotorInertia>{text}</rotorInertia>")))
+
+
+def test_what_is_no_number_does_not_matter_where_the_description_states_it():
+    # As in the URDF of a maker that left a placeholder behind.
+    left = tree(("j2", "<mechanicalReduction>reduction</mechanicalReduction><rotorInertia>inertia</rotorInertia>"))
+    own = (BARE[0], JointDescription(reduction=100.0, rotor_inertia=2e-5), BARE[2])
+    np.testing.assert_array_equal(reductions(NAMES, own, URDF, left), [1.0, 100.0, 1.0])
+    np.testing.assert_array_equal(rotor_inertias(NAMES, own, URDF, left), [np.nan, 2e-5, np.nan])
+    with pytest.raises(RobotError, match=r"is 'reduction'; .* state reduction of j2 in robot\.yaml"):
+        reductions(NAMES, BARE, URDF, left)
 
 
 def test_a_reduction_of_zero_is_refused():

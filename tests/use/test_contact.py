@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from scara_ident.files import json_text
-from scara_ident.use.contact import contacts_dict, look_for_contact
+from scara_ident.use.contact import contacts_dict, look_for_contact, sentences
 from scara_ident.use.observer import ContactObserver, contact_observer
 from tests.use.quiet import known_ur5, moved_from, pushed, quiet
 
@@ -48,6 +48,7 @@ def test_what_loads_inner_joints_only_is_on_their_link(observer: ContactObserver
     found = look_for_contact(observer, [pushed(quiet(7), 2.0 * FORCE, 8.0, 9.0, joints=2)])
     assert {each.place for each in found.contacts} == {"upper_arm_link"}
     assert found.contacts[0].force is None
+    assert "the contact is on the named link or farther out" in " ".join(sentences(found))
 
 
 @pytest.mark.slow
@@ -89,8 +90,10 @@ def test_a_force_that_turns_in_the_arms_frame_is_reported_in_the_bases(observer:
 def test_near_a_singular_pose_no_force_is_reported(observer: ContactObserver):
     # Upright, with all axes but the first and the last but one parallel: what pushes down is not felt.
     held = moved_from(quiet(7), np.array([0.0, -np.pi / 2, 0.0, -np.pi / 2, 0.0, 0.0]), 1e-2)
-    contacts = look_for_contact(observer, [pushed(held, 4.0 * FORCE, 8.0, 9.0)]).contacts
-    during = [each for each in contacts if 8.0 <= each.start < 8.3]
+    found = look_for_contact(observer, [pushed(held, 4.0 * FORCE, 8.0, 9.0)])
+    during = [each for each in found.contacts if 8.0 <= each.start < 8.3]
     assert during
     assert all(each.force is None and each.force_words == "-" for each in during)
     assert all(each.entry["force_std"] is None for each in during)
+    unsure = "Near a singular pose the force on the tool is not determined."
+    assert (unsure in sentences(found)) == any(each.place == "tool" and each.force is None for each in found.contacts)
