@@ -66,7 +66,7 @@ def best_exchange(
         beside = step.without(place)
         (own,) = beside.judge([item])
         least = ROUNDING * float(np.sum(beside.model.squares))
-        for other, decision in (*_fitted_alternatives(beside, own, able, first), *_other_laws(beside, item)):
+        for other, decision in _fitted_alternatives(beside, own, able, first):
             saved = float(np.sum(own.examination.left) - np.sum(decision.examination.left))
             saved = saved if abs(saved) > least else 0.0
             alike = same((beside, own), (other, decision))
@@ -127,12 +127,6 @@ def _fitted_alternatives(
     refined = [item for item in beside.refine(rest[: criteria.max_refined]) if item.examination.held_out >= enough]
     fitted = [*by_fit, *(fitted_with(beside, item.candidate) for item in refined)]
     return [pair for pair in fitted if pair[1].accepted]
-
-
-def _other_laws(beside: SelectionStep, item: Candidate) -> list[tuple[SelectionStep, Decision]]:
-    """Return the accepted fits of an effect by its other laws: what was missing when it came in may have hidden by which it is."""
-    laws = [replace(item, effect=law) for law in item.effect.other_laws()]
-    return [pair for pair in (fitted_with(beside, law) for law in laws) if pair[1].accepted]
 
 
 def _fewer(count: Callable[[], int], other: SelectionStep, decision: Decision) -> bool:

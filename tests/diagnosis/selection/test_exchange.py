@@ -9,14 +9,12 @@ import pytest
 
 from scara_ident.diagnosis.candidates.candidates import Candidate
 from scara_ident.diagnosis.checks.same_errors import same
-from scara_ident.diagnosis.fitting.nonlinear_fit import tune
 from scara_ident.diagnosis.selection.exchange import best_exchange, near_in_place, needed
 from scara_ident.effects import Member
 from scara_ident.effects.friction import AsymmetricFriction, Stribeck
 from scara_ident.effects.measurement import TimeDelay
 from scara_ident.effects.position import Spring
-from tests.arms import noisy
-from tests.diagnosis.made import NOISE, Bent, Bump, exact_runs, searched, step_beside, with_torque
+from tests.diagnosis.made import Bent, Bump, exact_runs, searched, step_beside, with_torque
 
 SPRING, ASYMMETRIC = Candidate(Spring(), Member(0)), Candidate(AsymmetricFriction(), Member(0))
 STIFFNESS, DIFFERENCE = 0.08, 0.05
@@ -130,19 +128,3 @@ def test_what_does_as_well_with_fewer_others_takes_the_place():
     assert (found.place, found.decision.label) == (0, "spring of joint1")
     # Beside two that are both needed with either, it would change nothing.
     assert best_exchange(step_beside(runs, [wrong, mends]), [SPRING], step.scene) is None
-
-
-@pytest.mark.parametrize(("exponent", "noise", "told"), [(1, 0.3, 1), (2, 0.3, None), (1, 20.0, None)])
-def test_a_law_taken_before_the_others_were_found_goes_for_one_that_explains_more(exponent, noise, told):
-    """Beside a tilt that was found later a gear's loss kept the law of second order, and a weight was 15 standard deviations off."""
-
-    def added(motion):
-        return 0.1 * np.sign(motion.v[0]) * np.exp(-(np.abs(motion.v[0] / 0.15) ** exponent))
-
-    rng = np.random.default_rng(5)
-    runs = [noisy(run, rng, noise * np.array(NOISE)) for run in with_torque(exact_runs(), 0, added)]
-    step = tune(step_beside(runs, [Candidate(Stribeck(2), Member(0, (0.15,)))], 1.0 / (noise * np.array(NOISE))))
-    found = best_exchange(step, [], step.scene)
-    assert (None if found is None else (found.place, found.decision.candidate.effect)) == (
-        None if told is None else (0, Stribeck(told))
-    )
