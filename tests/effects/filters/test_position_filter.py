@@ -10,19 +10,17 @@ import pytest
 from scipy.signal import bilinear, lfilter, lfilter_zi
 
 from scara_ident.arrays import Array
-from scara_ident.diagnosis import diagnose
 from scara_ident.effects import Member, Signals
 from scara_ident.effects.elasticity import JointElasticity
 from scara_ident.effects.filters.position_filter import PositionFilter
 from scara_ident.effects.measurement import shifted
 from scara_ident.model.model import build_model
 from scara_ident.robot.robot import load_robot
-from scara_ident.simulation import parse_effect, simulate, virtual_arm
-from tests.diagnosis.made import BANDS, multisine
+from tests.effects.filters.runs import RATE, diagnosed
 from tests.effects.scenes import columns, fit, moving, scene_of
 from tests.effects.test_measurement import recordings
 
-RATE, DELAY, ALL = 500.0, 0.012, Member(None)
+DELAY, ALL = 0.012, Member(None)
 
 
 def through(up: Array, down: Array, positions: Array) -> Array:
@@ -126,14 +124,7 @@ def test_links_behind_gears_are_filtered_with_the_bodies():
 
 @pytest.mark.slow
 def test_behind_a_filter_of_the_positions_inertias_are_right_and_it_is_named():
-    arm = replace(virtual_arm(), torque_noise=np.array([0.002, 0.0008]))
-    effects = [parse_effect("position_filter:time_constant=0.01")]
-    made = [
-        simulate(arm, multisine(f"m{seed}", seed, 8.0, 0.8), effects=effects, seed=seed, repetition=k, rate=RATE)
-        for seed in (2, 3)
-        for k in (1, 2)
-    ]
-    found = diagnose(load_robot(), [item.recording for item in made], bands=BANDS)
+    found = diagnosed("position_filter:time_constant=0.01")
     names = {item.effect: item.parameters for item in found.effects}
     assert sorted(names) == ["position_filter", "time_delay"]
     # A fifth of a sample: friction turns by another time in this band than the filter moves it.

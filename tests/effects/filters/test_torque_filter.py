@@ -3,26 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.signal import bilinear, lfilter
 
 from scara_ident.arrays import Array
-from scara_ident.diagnosis import diagnose
 from scara_ident.effects import Member, Signals
 from scara_ident.effects.filters.torque_filter import TorqueFilter
 from scara_ident.effects.following import predicted_slopes
 from scara_ident.effects.measurement import shifted
 from scara_ident.model.model import build_model
 from scara_ident.robot.robot import load_robot
-from scara_ident.simulation import parse_effect, simulate, virtual_arm
-from tests.diagnosis.made import BANDS, multisine
+from tests.effects.filters.runs import RATE, diagnosed
 from tests.effects.scenes import columns, fit, moving, scene_of
 from tests.effects.test_measurement import recordings
 
-RATE, DELAY, ALL = 500.0, 0.012, Member(None)
+DELAY, ALL = 0.012, Member(None)
 
 
 def first_order(torque: Array) -> Array:
@@ -102,14 +99,7 @@ def test_columns_are_those_of_the_laws_and_follow_the_estimate():
 @pytest.mark.slow
 def test_behind_a_filter_of_the_torque_inertias_are_right_and_it_is_named():
     """It was a time_delay alone, and inertias were 6 standard deviations low."""
-    arm = replace(virtual_arm(), torque_noise=np.array([0.002, 0.0008]))
-    effects = [parse_effect("torque_filter:time_constant=0.01")]
-    made = [
-        simulate(arm, multisine(f"m{seed}", seed, 8.0, 0.8), effects=effects, seed=seed, repetition=k, rate=RATE)
-        for seed in (2, 3)
-        for k in (1, 2)
-    ]
-    found = diagnose(load_robot(), [item.recording for item in made], bands=BANDS)
+    found = diagnosed("torque_filter:time_constant=0.01")
     names = {item.effect: item.parameters for item in found.effects}
     assert sorted(names) == ["time_delay", "torque_filter"]
     assert names["time_delay"]["delay"].value == pytest.approx(0.01, abs=2e-4)
