@@ -20,6 +20,7 @@ from scara_ident.diagnosis.selection.audit import (
     superfluous,
     unsettled,
 )
+from scara_ident.diagnosis.selection.better_law import by_better_law
 from scara_ident.diagnosis.selection.choice import fitted_beside, more_than_chance
 from scara_ident.diagnosis.selection.other_bands import in_bands_of
 from scara_ident.diagnosis.selection.search import Search, SearchTask, in_place_of, scene_of, search, search_again
@@ -196,7 +197,11 @@ def _without_proxies(task: SearchTask, found: Outcome) -> Outcome:
     for _ in range(task.criteria.max_demotions):
         refused = [*proxies(found, task.criteria), *_unstable(found, _others(demoted, found))]
         if not refused:
-            break
+            bettered = by_better_law(found.search, found.after.weights)
+            if bettered is None:
+                break
+            found = outcome_of(task, bettered)
+            continue
         demoted |= {item.label: item for item in reversed(refused)}
         scene = found.search.scene
         instead = {label: pair for label, pair in instead.items() if all(item.label != label for item in refused)}

@@ -21,10 +21,12 @@ from scara_ident.diagnosis.model_selection import (
     below_position_noise,
     select_model,
 )
+from scara_ident.diagnosis.selection import choice
 from scara_ident.diagnosis.selection.search import SearchTask, search
 from scara_ident.diagnosis.testing.selection_step import SelectionStep, observed
 from scara_ident.effects import CATALOGUE, Member
 from scara_ident.effects.elasticity import JointElasticity
+from scara_ident.effects.friction import Stribeck
 from scara_ident.effects.links import usual_link_inertia
 from scara_ident.effects.periodic import Vibration
 from scara_ident.effects.position import Spring
@@ -34,7 +36,8 @@ from scara_ident.estimation.least_squares import value_and_weights
 from scara_ident.estimation.observations import observe
 from scara_ident.estimation.run_offsets import rms_of
 from scara_ident.motion.prepared import prepare
-from tests.diagnosis.made import complete, searched, virtual_runs
+from tests.arms import noisy
+from tests.diagnosis.made import BANDS, complete, exact_runs, searched, virtual_runs, with_torque
 
 MODEL = complete()
 
@@ -150,6 +153,26 @@ def test_a_band_beyond_is_looked_at_for_what_this_one_does_not_show(monkeypatch:
 
 
 @pytest.mark.slow
+def test_a_law_that_hid_when_its_effect_came_in_is_chosen_in_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    def added(motion):
+        return 0.1 * np.sign(motion.v[0]) * np.exp(-np.abs(motion.v[0] / 0.15))
+
+    runs = [noisy(run, np.random.default_rng(5), (0.006, 0.0024)) for run in with_torque(exact_runs(), 0, added)]
+    # As where something else is missing yet: both laws leave as much, and that of its name is taken.
+    monkeypatch.setattr(choice, "same", lambda own, other: True)
+    at_first = searched(runs, Stribeck())
+    assert [item.effect for item in at_first.chosen] == [Stribeck()]
+    end = selected(runs, Stribeck(), bands=BANDS, free=False)
+    assert [item.effect for item in end.search.chosen] == [Stribeck(1)]
+    assert (end.demoted, end.unexplained) == ((), None)
+    # What is reported is what the better law leaves.
+    kept = outcome_of(SearchTask(MODEL, (Stribeck(),)), at_first)
+    (new, *_), (old, *_) = (rms_of(item.after.value, item.training) for item in (end, kept))
+    assert new is not None
+    assert old is not None
+    assert new < 0.99 * old
+
+
 def test_what_was_found_shows_that_the_band_is_wider() -> None:
     runs = virtual_runs("presliding:joint1:presliding_distance=0.0075", "vibration:joint2:amplitude=0.02")
     outcome = selected(runs, Presliding(), Vibration(), bands=(4.0, 4.0), free=True)

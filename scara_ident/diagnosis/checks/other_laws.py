@@ -18,6 +18,7 @@ from scara_ident.diagnosis.checks.other_minima import as_good, widened
 from scara_ident.diagnosis.checks.same_errors import same
 from scara_ident.diagnosis.fitting.effect_parameters import LinearParameters, PhysicalParameters, physical_parameters
 from scara_ident.diagnosis.fitting.nonlinear_fit import tune
+from scara_ident.diagnosis.testing.acceptance import Decision
 from scara_ident.diagnosis.testing.selection_step import SelectionStep
 
 
@@ -88,11 +89,28 @@ def _beside_rest(step: SelectionStep) -> Iterator[SelectionStep]:
 
 def _as_good(step: SelectionStep, place: int) -> Iterator[SelectionStep]:
     """Give the model with one effect by each other law that explains as much as its own, all else fitted with it."""
-    item = step.chosen[place]
-    for family in item.effect.other_laws():
-        chosen = (*step.chosen[:place], replace(item, effect=family), *step.chosen[place + 1 :])
-        again = tune(replace(step, chosen=chosen))
-        pairs = [(each.without(place), each.chosen[place]) for each in (step, again)]
-        (mine, mine_judged), (its, its_judged) = [(beside, beside.judge([one])[0]) for beside, one in pairs]
-        if same((mine, mine_judged), (its, its_judged)):
+    own = judged_in_place(step, place)
+    for again in by_other_laws(step, place):
+        if same(own, judged_in_place(again, place)):
             yield again
+
+
+def by_other_laws(step: SelectionStep, place: int) -> Iterator[SelectionStep]:
+    """Give the model with one effect by each of its other laws, all else fitted with it.
+
+    Parameters
+    ----------
+    step : SelectionStep
+    place : int
+        Index of the effect, among those chosen.
+    """
+    item = step.chosen[place]
+    for law in item.effect.other_laws():
+        chosen = (*step.chosen[:place], replace(item, effect=law), *step.chosen[place + 1 :])
+        yield tune(replace(step, chosen=chosen))
+
+
+def judged_in_place(step: SelectionStep, place: int) -> tuple[SelectionStep, Decision]:
+    """Return the model without one of its effects, and the decision on that effect beside it."""
+    beside = step.without(place)
+    return beside, beside.judge([step.chosen[place]])[0]
