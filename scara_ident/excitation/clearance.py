@@ -199,19 +199,27 @@ class Clearance(Frozen):
         The rooms of all pairs of a group make up one that is a little less than the least of them, and none where that is
         none, and that changes smoothly when another pair becomes the nearest. Where a pair is too near the worst counts alone.
         """
+        _, least, parallel = self._rooms(found, samples)
+        return 1.0 - np.where(least > 0.0, parallel ** (-1.0 / POWER), least)
+
+    def _rooms(self, found: Nearest, samples: int) -> tuple[Array, Array, Array]:
+        """Return the room of every pair, in watched distances, shape (K,), and of each group the least and the sum of powers, (G, N)."""
         room = (found.distance - self.margin) / WATCHED_DISTANCE
         place = self._group[found.pair], found.place
         least, parallel = np.ones((2, len(self.groups), samples))
         np.minimum.at(least, place, room)
         np.add.at(parallel, place, np.where(room > 0.0, room, 1.0) ** -POWER - 1.0)
-        return 1.0 - np.where(least > 0.0, parallel ** (-1.0 / POWER), least)
+        return room, least, parallel
 
     def slopes(self, q: Array, found: Nearest) -> Array:
-        """Return the derivative of the rows by the joints where nothing is too near, shape (G, n, N)."""
+        """Return the derivative of the rows by the joints, shape (G, n, N)."""
         slope = np.zeros((len(self.groups), q.shape[1], len(q)))
         place = self._group[found.pair], found.place
-        share = (1.0 - self.rows(found, q.shape[1])[place]) * WATCHED_DISTANCE / (found.distance - self.margin)
-        np.add.at(slope, place, -self.gradients(q, found) * (share ** (POWER + 1.0) / WATCHED_DISTANCE)[:, None])
+        room, least, parallel = self._rooms(found, q.shape[1])
+        free = least[place] > 0.0
+        together = (parallel[place] ** (-1.0 / POWER) / np.where(free, room, 1.0)) ** (POWER + 1.0)
+        share = np.where(free, together, room == least[place])
+        np.add.at(slope, place, -self.gradients(q, found) * (share / WATCHED_DISTANCE)[:, None])
         return slope.transpose(0, 2, 1)
 
     def gradients(self, q: Array, found: Nearest) -> Array:

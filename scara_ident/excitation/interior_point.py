@@ -24,6 +24,8 @@ NEARLY = 0.95
 SUFFICIENT = 1e-4
 HALVINGS = 8
 MIN_DAMPING, MAX_DAMPING = 1e-6, 1e12
+# Steps by which a motion is moved inside its limits, how far inside each aims, in the room asked for, and the first damping.
+MOVES, AIM, FIRST_DAMPING = 40, 2.0, 1e-2
 # How far multipliers may be from what the barrier alone says.
 MULTIPLIER_RANGE = 1e3
 
@@ -86,6 +88,41 @@ def shrunk_inside(problem: Problem, x: Array, room: float = 0.03, factor: float 
         if np.isfinite(point.cost) and np.min(_slack(problem, point.values)) > room:
             return x
         x = factor * x
+    return None
+
+
+def moved_inside(problem: Problem, x: Array, room: float) -> Array | None:
+    """Change a motion that breaks limits by as little as brings it inside; None where it stays outside.
+
+    Shrinking leads nowhere where a link comes nearer to another on the way. The steps are those of Levenberg and
+    Marquardt towards what is broken alone, damped by what they change of all limited signals.
+
+    Parameters
+    ----------
+    x : ndarray, shape (k, n, m)
+    room : float
+        Least distance from each limit, as a share of it.
+    """
+    two, damping, tried = problem.two_sided, FIRST_DAMPING, x
+    best, least, slopes = problem.whole(x), np.inf, None
+    for _ in range(MOVES):
+        point = best if tried is x else problem.whole(tried)
+        beyond = np.maximum(AIM * room - _slack(problem, point.values), 0.0)
+        if np.max(beyond) < (AIM - 1.0) * room and np.isfinite(point.cost):
+            return tried
+        if np.sum(beyond**2) < least:
+            best, least, slopes = point, float(np.sum(beyond**2)), problem.slopes(point)
+            force = -slopes.pull(_fold(beyond, two, -1.0))
+            matrix = slopes.curvature(_fold((beyond > 0.0).astype(float), two, 1.0))
+            whole = slopes.curvature(np.ones_like(point.values))
+            # Of all trajectories together: one that breaks nothing stays as it is.
+            whole *= np.einsum("kii->", matrix) / np.einsum("kii->", whole)
+            damping *= 0.3
+        else:
+            damping *= 10.0
+        # A trajectory with fewer harmonics than another leaves the last coefficients unused.
+        change = np.linalg.pinv(matrix + damping * whole, hermitian=True) @ force[..., None]
+        tried = best.x + change.reshape(x.shape)
     return None
 
 

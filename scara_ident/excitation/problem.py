@@ -164,6 +164,14 @@ class Problem:
         cost, uphill = self._cost(found.regressor)
         return replace(found, cost=cost, uphill=uphill)
 
+    def whole(self, x: Array) -> Point:
+        """Evaluate coefficients with all rows and the cost, whatever limits they break."""
+        motion = self.motion(x)
+        found = self._limited(x, motion, self._own(x, motion), broken=True)
+        assert found.regressor is not None
+        cost, uphill = self._cost(found.regressor)
+        return replace(found, cost=cost, uphill=uphill)
+
     def inside(self, x: Array) -> bool:
         """Tell whether all limits are kept, whatever the cost."""
         motion = self.motion(x)
@@ -181,7 +189,7 @@ class Problem:
         return self._limited(x, motion, self._own(x, motion), broken=True).values
 
     def slopes(self, point: Point) -> Slopes:
-        """Return cost and limits with their derivatives at a point within all limits."""
+        """Return cost and limits with their derivatives at a point with all rows."""
         task, motion, regressor = self.task, point.motion, point.regressor
         assert regressor is not None
         k, n = point.x.shape[:2]

@@ -11,7 +11,7 @@ import numpy as np
 from scara_ident.arrays import Array
 from scara_ident.errors import ArgumentError, UsageError
 from scara_ident.excitation.criteria import Condition
-from scara_ident.excitation.interior_point import Minimum, Schedule, minimise, shrunk_inside
+from scara_ident.excitation.interior_point import Minimum, Schedule, minimise, moved_inside, shrunk_inside
 from scara_ident.excitation.limits import InfeasibleLimits
 from scara_ident.excitation.problem import Problem, Task, row_names
 from scara_ident.excitation.verification import extremes, grid
@@ -33,6 +33,8 @@ FINER, MIN_RATE = 10, 1000.0
 BOUND, CLOSE, MARGIN = 0.999, 0.998, 5e-4
 # How the winner, searched anew on the finer grid, goes on where it broke a limit between the times.
 CORRECTION = Schedule(first=0.05, last=1e-2, tolerance=1e-2, steps=50, sharpness=1.0)
+# Room that it has to its limits to begin with, as a share of them.
+ROOM = 1e-3
 # Size of changes of a good motion, as shares of it.
 CHANGES = (0.03, 0.1, 0.2)
 ELITE = 3
@@ -194,7 +196,7 @@ def _finish(task: Task, x: Array) -> tuple[Array, int]:
     problem = within_grid(task, FINE, bounds)
     times = _verified_times(problem)
     for _ in range(CORRECTIONS):
-        start = shrunk_inside(problem.sharpened(plan.sharpness), x, room=1e-3, factor=0.998)
+        start = moved_inside(problem.sharpened(plan.sharpness), x, room=ROOM)
         if start is None:
             # It is far outside where the coarse grid did not look, and is searched again from where it is inside.
             start, plan = shrunk_inside(problem.sharpened(0.0), x), Schedule()
@@ -207,7 +209,9 @@ def _finish(task: Task, x: Array) -> tuple[Array, int]:
         bounds = bounds * np.where(excess > 1.0, (1.0 - MARGIN) / np.maximum(excess, 1.0), 1.0)
         problem = within_grid(task, FINE, bounds)
         plan = CORRECTION
-    return verified_inside(problem, x)
+    # What was corrected last is moved alone: searched again, it would end at the limits once more.
+    moved = moved_inside(problem.sharpened(plan.sharpness), x, room=ROOM)
+    return verified_inside(problem, x if moved is None else moved)
 
 
 def verified_inside(problem: Problem, x: Array) -> tuple[Array, int]:

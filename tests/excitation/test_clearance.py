@@ -98,6 +98,11 @@ def test_pairs_count_together_and_smoothly(tmp_path):
     slopes = by_difference(q[:, inside], lambda q: clearance.rows(clearance.nearest(q, clearance.reach), q.shape[1]))
     found = clearance.slopes(q[:, inside], clearance.nearest(q[:, inside], clearance.reach))
     np.testing.assert_allclose(found, slopes, atol=1e-5 * np.abs(found).max())
+    # Too near the nearest alone tells which way there is more room, but where another takes its place.
+    broken = q[:, ~free & (np.abs(room[0] - room[1]) > 1e-3)]
+    slopes = by_difference(broken, lambda q: clearance.rows(clearance.nearest(q, clearance.reach), q.shape[1]))
+    found = clearance.slopes(broken, clearance.nearest(broken, clearance.reach))
+    np.testing.assert_allclose(found, slopes, atol=1e-5 * np.abs(found).max())
 
 
 def test_distances_do_not_depend_on_what_was_measured_before():

@@ -23,6 +23,11 @@ def test_gradient_and_slopes_are_those_of_differences(name):
     point = problem.at(x)
     slopes = problem.slopes(point)
     assert slopes.cost == pytest.approx(point.cost, rel=1e-12)
+    # Beyond the limits they are at hand too.
+    whole = problem.whole(3.0 * x)
+    assert np.isinf(problem.at(3.0 * x).cost) and np.isfinite(whole.cost)
+    np.testing.assert_array_equal(whole.values, problem.limited(3.0 * x))
+    np.testing.assert_array_equal(problem.whole(x).values, point.values)
     rng = np.random.default_rng(5)
     for _ in range(4):
         direction = rng.standard_normal(x.shape) * np.abs(x).max() * 1e-4
