@@ -30,18 +30,22 @@ def through(
         The line through the ends of the extended signal, which was subtracted, and its rise per sample. A filter with
         the static gain g and the mean delay T turns it into ``g (chord - T slope)``.
     """
+    # Most runs need no such filter, and SciPy's transforms take a while to load.
+    from scipy.fft import next_fast_len
+
     count = signal.shape[-1]
     reach = min(count - 1, memory)
     head = 2.0 * signal[..., :1] - signal[..., reach:0:-1]
     tail = 2.0 * signal[..., -1:] - signal[..., -2 : -reach - 2 : -1]
     extended = np.concatenate([head, signal, tail], axis=-1)
     length = extended.shape[-1]
-    # Without its chord the extended signal is periodic.
+    # Without its chord the extended signal begins and ends at zero, and zeros continue it to a length that is transformed fast.
     slope = (extended[..., -1:] - extended[..., :1]) / (length - 1)
     ramp = extended[..., :1] + slope * np.arange(length)
-    gain = np.array(response(np.asarray(2.0 * np.pi * np.fft.rfftfreq(length), dtype=float)), dtype=complex)
-    if length % 2 == 0:
+    closed = int(next_fast_len(length, real=True))
+    gain = np.array(response(np.asarray(2.0 * np.pi * np.fft.rfftfreq(closed), dtype=float)), dtype=complex)
+    if closed % 2 == 0:
         gain[-1] = gain[-1].real
-    moved = np.fft.irfft(np.fft.rfft(extended - ramp, axis=-1) * gain, length, axis=-1)
+    moved = np.fft.irfft(np.fft.rfft(extended - ramp, closed, axis=-1) * gain, closed, axis=-1)
     inside = slice(reach, reach + count)
     return np.asarray(moved[..., inside]), ramp[..., inside], slope

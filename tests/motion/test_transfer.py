@@ -41,3 +41,13 @@ def test_nothing_is_changed_by_a_gain_of_one():
     signal = np.random.default_rng(1).standard_normal(257)
     moved, chord, _ = through(signal, np.ones_like, 64)
     assert moved + chord == pytest.approx(signal)
+
+
+@pytest.mark.parametrize("count", [6001, 8101])
+def test_a_length_that_transforms_slowly_is_filtered_as_any_other(count: int):
+    """12391 samples, a prime number, took eleven times as long."""
+    rng = np.random.default_rng(3)
+    signal = np.cumsum(rng.standard_normal((2, count)), axis=-1)
+    moved, chord, slope = through(signal, response, 100)
+    found = moved + chord - slope * TIME_CONSTANT * RATE
+    assert found[..., 200:] == pytest.approx(lfilter(UP, DOWN, signal, axis=-1)[..., 200:], abs=1e-3 * np.ptp(signal))
