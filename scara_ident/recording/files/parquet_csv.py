@@ -5,17 +5,17 @@ from __future__ import annotations
 import csv
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from io import BytesIO
+from io import BytesIO, TextIOWrapper
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError
 from scara_ident.files import replacing, why_unwritten
 from scara_ident.memory import check_memory
 from scara_ident.quiet import quiet_stderr
-from scara_ident.recording.files.csv_layout import MISSING, CsvLayout, csv_layout
+from scara_ident.recording.files.csv_layout import MISSING, CsvLayout, csv_layout, one_blank
 from scara_ident.recording.files.dates import first_wrong, seconds
 from scara_ident.recording.files.files import check_file
 
@@ -163,11 +163,11 @@ def _read_csv(path: Path, names: Sequence[str]) -> pl.DataFrame:
     }
 
     def schema(kind: type[pl.DataType]) -> dict[str, type[pl.DataType]]:
-        return {str(k): kind if k in how["columns"] else pl.String for k in range(len(layout.names))}
+        return {str(k): kind if k in how["columns"] else pl.String for k in range(layout.cells)}
 
     def read(kind: type[pl.DataType], **more: Any) -> pl.DataFrame:
         # No path: releases of Polars before 2.0 take no columns by place where the name holds signs of a pattern.
-        with BytesIO(path.read_text("utf-16").encode()) if layout.encoding == "utf-16" else path.open("rb") as file:
+        with _lines(path, layout) as file:
             return pl.read_csv(file, schema=schema(kind), **how, **more)
 
     try:
@@ -179,6 +179,17 @@ def _read_csv(path: Path, names: Sequence[str]) -> pl.DataFrame:
         if layout.decimal_comma:
             frame = frame.with_columns(pl.all().str.replace(",", ".", literal=True))
     return frame.select(pl.col(str(own)).alias(name) for name, own in place.items())
+
+
+def _lines(path: Path, layout: CsvLayout) -> BinaryIO:
+    """Return a CSV file in UTF-8 or what its numbers are alike in, with one separator between two cells."""
+    if layout.encoding == "utf-16":
+        text = path.read_text("utf-16").encode()
+    elif layout.separator == " ":
+        text = path.read_bytes()
+    else:
+        return path.open("rb")
+    return BytesIO(one_blank(text) if layout.separator == " " else text)
 
 
 def _check_parquet(path: Path, names: Sequence[str]) -> None:
@@ -233,8 +244,8 @@ def numbers(path: Path, series: pl.Series) -> Array:
 
 
 def _refuse_long_rows(path: Path, layout: CsvLayout) -> None:
-    width = len(layout.names)
-    with path.open(encoding=layout.encoding, newline="", errors="replace") as file:
+    width = layout.cells
+    with TextIOWrapper(_lines(path, layout), encoding="utf-8", newline="", errors="replace") as file:
         rows = csv.reader(islice(file, layout.first, None), delimiter=layout.separator)
         # A field longer than Python's parser takes is no number, and said to be none where it is wanted.
         with suppress(csv.Error):
