@@ -77,6 +77,8 @@ _ENDINGS = {
     "nsec": "ns", "sec": "s", "seconds": "s", "rpm": "rpm", "nm": "N m", "amps": "A", "percent": "%",
     "grad": "deg", "degre": "deg", "degres": "deg", "prozent": "%",
 }  # fmt: skip
+# A whole turn in the units in which angles are usually recorded.
+TURNS = (2.0 * np.pi, 360.0)
 # Columns without names, in blocks of one for each joint: what slopes confirm comes first, and may have others behind it.
 CONFIRMED = ("position", "velocity", "effort")
 BLOCKS = (CONFIRMED, ("position", "effort"))
@@ -324,9 +326,18 @@ def _meaning(quantity: str, number: int | None) -> Meaning:
 
 
 def _are_slopes(numbers: Mapping[str, Array], time: str, positions: Sequence[str], velocities: Sequence[str]) -> bool:
-    slope = slopes(numbers[time], np.array([numbers[name] for name in positions]))
+    held = np.array([numbers[name] for name in positions])
+    # An angle may be held within one turn, and its unit is not known yet.
+    readings = [held, *(np.unwrap(held, axis=1, period=turn) for turn in TURNS)]
+    known = np.array([slopes(numbers[time], reading) for reading in readings])
     mean = averages(numbers[time], np.array([numbers[name] for name in velocities]))
-    for known, recorded in zip(slope, mean, strict=True):
-        if np.std(known) > 0 and (np.std(recorded) == 0 or np.corrcoef(known, recorded)[0, 1] < MIN_CORRELATION):
-            return False
-    return True
+    return all(
+        any(_is_slope(reading, own) for reading in joint) for joint, own in zip(known.swapaxes(0, 1), mean, strict=True)
+    )
+
+
+def _is_slope(known: Array, recorded: Array) -> bool:
+    """Tell whether what was recorded is the slope; of what stands still it may be."""
+    if np.std(known) == 0:
+        return True
+    return bool(np.std(recorded) > 0 and np.corrcoef(known, recorded)[0, 1] >= MIN_CORRELATION)
