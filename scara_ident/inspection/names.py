@@ -326,14 +326,17 @@ def _meaning(quantity: str, number: int | None) -> Meaning:
 
 
 def _are_slopes(numbers: Mapping[str, Array], time: str, positions: Sequence[str], velocities: Sequence[str]) -> bool:
-    held = np.array([numbers[name] for name in positions])
-    # An angle may be held within one turn, and its unit is not known yet.
-    readings = [held, *(np.unwrap(held, axis=1, period=turn) for turn in TURNS)]
-    known = np.array([slopes(numbers[time], reading) for reading in readings])
     mean = averages(numbers[time], np.array([numbers[name] for name in velocities]))
     return all(
-        any(_is_slope(reading, own) for reading in joint) for joint, own in zip(known.swapaxes(0, 1), mean, strict=True)
+        any(_is_slope(slopes(numbers[time], reading[None])[0], own) for reading in _readings(numbers[name]))
+        for name, own in zip(positions, mean, strict=True)
     )
+
+
+def _readings(angle: Array) -> list[Array]:
+    """Return a position as it stands, and the whole angle that it may be if it is held within one turn, in any unit."""
+    held = [turn for turn in TURNS if np.ptp(angle) <= turn]
+    return [angle, *(np.unwrap(angle, period=turn) for turn in held)]
 
 
 def _is_slope(known: Array, recorded: Array) -> bool:
