@@ -66,6 +66,11 @@ class PerMotorTurn(Sinusoid):
             if x < PERIODS_COVERED * _order_resolution(scene, j)
         )
 
+    def description(self, scene: Scene, member: Member) -> str:
+        """Return the description, in the singular for one period, with whose turn it is where no gear is known."""
+        said = super().description(scene, member).replace(" 1 periods ", " 1 period ")
+        return f"{said} (a turn of the joint: its reduction is 1)" if _gearless(scene, member) else said
+
     def _in_band(self, scene: Scene, joint: int) -> Iterable[float]:
         turns_per_second = abs(float(scene.robot.reduction[joint])) * float(scene.speed[joint]) / (2.0 * np.pi)
         return (x for x in self.orders if SLOW_SHARE * x * turns_per_second <= scene.band)
@@ -90,11 +95,11 @@ class TorqueRipple(PerMotorTurn):
     experiment = "move slowly at constant speed over several motor turns, and record at a high rate"
 
     def description(self, scene: Scene, member: Member) -> str:
-        """Say one period as one, and behind which reduction they would be a whole number: one that is not is often stated wrong."""
-        said = super().description(scene, member).replace(" of 1 periods ", " of 1 period ")
+        """Say behind which reduction periods would be a whole number: one that is not is often stated wrong."""
+        said = super().description(scene, member)
         order, stated = member.nonlinear[0], abs(float(scene.robot.reduction[member.place]))
         whole = round(order)
-        if stated == 1.0 or not 1 <= whole <= max(ORDERS) or abs(order / whole - 1.0) < WHOLE_ORDER:
+        if _gearless(scene, member) or not 1 <= whole <= max(ORDERS) or abs(order / whole - 1.0) < WHOLE_ORDER:
             return said
         return f"{said}, which would be {whole} with a reduction of {stated * order / whole:.4g}"
 
@@ -131,10 +136,6 @@ class EncoderEccentricity(PerMotorTurn):
     of_state = True
     experiment = "run at two constant speeds: an error of the encoder grows with the square of speed, ripple does not"
     orders = ENCODER_ORDERS
-
-    def description(self, scene: Scene, member: Member) -> str:
-        """Return the description, in the singular for one period."""
-        return super().description(scene, member).replace(" 1 periods ", " 1 period ")
 
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
         """Return the change of torque per amplitude of sine and of cosine."""
@@ -259,6 +260,11 @@ class Vibration(Sinusoid):
 
 def _rms_amplitude(value: Array) -> float:
     return float(np.sqrt(np.sum(value**2) / (0.5 * len(value))))
+
+
+def _gearless(scene: Scene, member: Member) -> bool:
+    """Whether the motor turns as the joint does, for all that is stated."""
+    return abs(float(scene.robot.reduction[member.place])) == 1.0
 
 
 def _order_resolution(scene: Scene, joint: int) -> float:

@@ -107,6 +107,7 @@ def largest_noise_torque(observations: Observations, value: Array, chance: float
             label not in data.labels[:place]
             for place, (label, item) in enumerate(zip(data.labels, data.recordings, strict=True))
             for part in item.stretches
+            if part.usable
             for _ in part.blocks[1:]
         ],
         dtype=bool,
@@ -142,6 +143,9 @@ def _noise_in_blocks(observations: Observations, value: Array) -> tuple[Array, A
     if known is None or not np.array_equal(known[0], value):
         squares, counts = [np.zeros((len(observations.joints), 0))], [np.zeros((len(observations.joints), 0))]
         for part, signals in zip(observations.data.stretches, noise_signals(observations, value), strict=True):
+            # What a gap leaves of a recording may be all end.
+            if not part.usable:
+                continue
             made = np.array([part.smooth(joint, signal) for joint, signal in enumerate(signals)])
             used = np.array(part.used)
             squares.append(np.add.reduceat(np.where(used, made, 0.0) ** 2, part.blocks[:-1], axis=1))

@@ -55,8 +55,8 @@ def channel_faults(observations: Observations) -> tuple[ChannelFault, ...]:
 
     A sign, or a zero by quarter turns (see `wrong_zeros`), is suspected where friction would feed energy in or a joint is
     explained badly, an exchange where two joints are hardly explained; only then are other readings tried, in a band that
-    no wrong reading has narrowed. One counts if it leaves at most half of the error, on blocks of time that it was not
-    fitted to and significantly more often than not, and the friction brakes. Where rows are not several times as many as
+    no wrong reading has narrowed. One counts if it leaves at most half of the error, of all joints or of those that are
+    hardly explained, on blocks of time that it was not fitted to and significantly more often than not, and the friction brakes. Where rows are not several times as many as
     parameters none is tried: an interpolating fit is good or bad by chance. All efforts turned round leave as much as they
     do; see `_all_turned` and `_bodies_turned`.
 

@@ -25,7 +25,7 @@ class ChannelFault:
         Those whose sign is opposite, or whose position counts from elsewhere, or the two that are exchanged.
     error, mended : float
         Rms of what is left as a share of the torque, geometric mean over the joints (of an effort turned round those that
-        either reading explains badly), on blocks of time that the parameters were not fitted to, as mapped and as it should be.
+        either reading explains badly; of all readings those that are hardly explained, where these alone show it), on blocks of time that the parameters were not fitted to, as mapped and as it should be.
     zeros : tuple of JointReading
         Of each joint, where its position counts from elsewhere by quarter turns, how it is to be read; else empty.
     alternatives : tuple of str

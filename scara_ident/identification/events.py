@@ -72,6 +72,8 @@ class Event:
         Between which times it begins, and ends, with 95 %; None of a whole recording.
     sizes : tuple of float
         Rms of the residual on each of the joints, N m or N; empty where only that of the first is known.
+    beyond : tuple of str
+        Joints of a whole recording whose error is larger than their torque: no prediction at all would err less.
     """
 
     recording: str
@@ -86,6 +88,7 @@ class Event:
     begins: tuple[float, float] | None = None
     ends: tuple[float, float] | None = None
     sizes: tuple[float, ...] = ()
+    beyond: tuple[str, ...] = ()
 
     @property
     def sized(self) -> tuple[tuple[str, float], ...]:
@@ -126,7 +129,14 @@ class Event:
         done = "" if self.held_out else "; left out of the fit"
         if np.isinf(self.score):
             why = "" if self.kind == "unknown" else f" ({self.kind})"
-            return f"{self.recording} is explained much worse than the fitted recordings{why}: {where}{more}{done}"
+            lost = (
+                f"; more than the torque itself on {', '.join(self.beyond)}: the model does not hold there"
+                if self.beyond
+                else ""
+            )
+            return (
+                f"{self.recording} is explained much worse than the fitted recordings{why}: {where}{more}{lost}{done}"
+            )
         unsure = [
             f", {word} between {least:.2f} and {most:.2f} s"
             for word, (least, most) in (("beginning", self.begins or (0.0, 0.0)), ("ending", self.ends or (0.0, 0.0)))

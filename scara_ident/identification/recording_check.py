@@ -60,9 +60,10 @@ def held_out_events(value: Array, training: Observations, held_out: Observations
         time = item.data.sources[0].time
         kind = "other payload" if payload_share(value, item, whole) >= PAYLOAD_FITS else "unknown"
         sizes = tuple(float(rms[j]) for j in shown)
-        found.append(
-            Event(item.name, 0.0, float(time[-1] - time[0]), joints, sizes[0], kind, held_out=True, sizes=sizes)
-        )
+        torque = [rows.rms(np.zeros_like(value)) for rows in item.joints]
+        beyond = tuple(training.model.robot.joints[j] for j in shown if rms[j] > torque[j])
+        last = float(time[-1] - time[0])
+        found.append(Event(item.name, 0.0, last, joints, sizes[0], kind, held_out=True, sizes=sizes, beyond=beyond))
     whole_ones = {event.recording for event in found}
     return (*found, *(event for event in within if event.recording not in whole_ones))
 

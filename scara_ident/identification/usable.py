@@ -13,6 +13,7 @@ from scara_ident.errors import RecordingError, UsageError
 from scara_ident.estimation.bands import BandChoice, choose_bands
 from scara_ident.estimation.observations import Observations, kept_rows
 from scara_ident.identification.held_at_once import held_at_once
+from scara_ident.identification.in_step import in_step
 from scara_ident.memory import keep_freed
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.motion import torque_of
@@ -88,7 +89,7 @@ def usable_in_bands(
     held_out, more = with_rows(held_out.at(bands), model.robot, needed=False)
     if validation and not held_out.recordings:
         raise RecordingError(f"{more[0]}, and nothing else is held out")
-    return data, held_out, [*notes, *useless, *short, *more]
+    return data, held_out, [*notes, *useless, *short, *more, *in_step(model.robot, data)]
 
 
 def _bands_of(model: TorqueModel, data: PreparedData, *, alike: bool) -> tuple[BandChoice, PreparedData, list[str]]:

@@ -77,6 +77,8 @@ _ENDINGS = {
     "nsec": "ns", "sec": "s", "seconds": "s", "rpm": "rpm", "nm": "N m", "amps": "A", "percent": "%",
     "grad": "deg", "degre": "deg", "degres": "deg", "prozent": "%",
 }  # fmt: skip
+# A whole turn in the units in which angles are usually recorded.
+TURNS = (2.0 * np.pi, 360.0)
 # Columns without names, in blocks of one for each joint: what slopes confirm comes first, and may have others behind it.
 CONFIRMED = ("position", "velocity", "effort")
 BLOCKS = (CONFIRMED, ("position", "effort"))
@@ -324,9 +326,21 @@ def _meaning(quantity: str, number: int | None) -> Meaning:
 
 
 def _are_slopes(numbers: Mapping[str, Array], time: str, positions: Sequence[str], velocities: Sequence[str]) -> bool:
-    slope = slopes(numbers[time], np.array([numbers[name] for name in positions]))
     mean = averages(numbers[time], np.array([numbers[name] for name in velocities]))
-    for known, recorded in zip(slope, mean, strict=True):
-        if np.std(known) > 0 and (np.std(recorded) == 0 or np.corrcoef(known, recorded)[0, 1] < MIN_CORRELATION):
-            return False
-    return True
+    return all(
+        any(_is_slope(slopes(numbers[time], reading[None])[0], own) for reading in _readings(numbers[name]))
+        for name, own in zip(positions, mean, strict=True)
+    )
+
+
+def _readings(angle: Array) -> list[Array]:
+    """Return a position as it stands, and the whole angle that it may be if it is held within one turn, in any unit."""
+    held = [turn for turn in TURNS if np.ptp(angle) <= turn]
+    return [angle, *(np.unwrap(angle, period=turn) for turn in held)]
+
+
+def _is_slope(known: Array, recorded: Array) -> bool:
+    """Tell whether what was recorded is the slope; of what stands still it may be."""
+    if np.std(known) == 0:
+        return True
+    return bool(np.std(recorded) > 0 and np.corrcoef(known, recorded)[0, 1] >= MIN_CORRELATION)

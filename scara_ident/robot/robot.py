@@ -20,6 +20,7 @@ from scara_ident.files import path_fault, real_path
 from scara_ident.manners import Frozen, several
 from scara_ident.robot.description import JointDescription, RobotDescription, read_description
 from scara_ident.robot.examples import urdf_of
+from scara_ident.robot.joint_limits import position_limits, speed_and_effort_limits
 from scara_ident.robot.mimic import Follower, coupled_ends, followers, lock_followers, refuse_coupled
 from scara_ident.robot.rotors import RotorGuess, guess_rotors
 from scara_ident.robot.signal_map import Channels, build_channels, check_rated_torque
@@ -62,7 +63,7 @@ class Robot(Frozen):
     effort_gain : ndarray, shape (n,)
         Torque in N m (N) per unit of the recorded effort.
     lower, upper : ndarray, shape (n,)
-        Range of each joint, rad or m; infinite where the URDF gives none.
+        Range of each joint, rad or m; infinite where the URDF gives none, or one that no joint has.
     velocity_limit, effort_limit : ndarray, shape (n,)
         Limits on the joint side, rad/s or m/s and N m or N; infinite where the URDF gives none.
     acceleration_limit, jerk_limit : ndarray, shape (n,)
@@ -250,7 +251,8 @@ def build_robot(description: RobotDescription, source: Path) -> Robot:
             )
         side = "joint"
     gain = np.array([joint.effort_gain for joint in joints])
-    effort_limit = _positive_or_inf(_upper(model, "Effort")[order])
+    velocity_limit, effort_limit = speed_and_effort_limits(model, order)
+    lower, upper = position_limits(model, position, unbounded, np.array(prismatic))
     at_drive = effort_limit / np.abs(reduction) if side == "motor" else effort_limit
     recorded = None if description.recording is None else description.recording.effort
     check_rated_torque(recorded, names, gain, at_drive, source)
@@ -267,9 +269,9 @@ def build_robot(description: RobotDescription, source: Path) -> Robot:
         rotor_stated=~np.isnan(rotors),
         effort_side=side,
         effort_gain=gain,
-        lower=np.where(unbounded, -np.inf, _given(model.lowerPositionLimit[position])),
-        upper=np.where(unbounded, np.inf, _given(model.upperPositionLimit[position])),
-        velocity_limit=_positive_or_inf(_upper(model, "Velocity")[order]),
+        lower=lower,
+        upper=upper,
+        velocity_limit=velocity_limit,
         effort_limit=effort_limit,
         acceleration_limit=np.array([joint.acceleration_limit or np.inf for joint in joints]),
         jerk_limit=np.array([joint.jerk_limit or np.inf for joint in joints]),
@@ -286,22 +288,6 @@ def build_robot(description: RobotDescription, source: Path) -> Robot:
         ),
         notes=notes,
     )
-
-
-def _upper(model: pin.Model, kind: Literal["Velocity", "Effort"]) -> Array:
-    # Older releases of Pinocchio have velocityLimit and effortLimit.
-    name = f"upper{kind}Limit"
-    return np.asarray(getattr(model, name if hasattr(model, name) else f"{kind.lower()}Limit"))
-
-
-def _given(limit: Array) -> Array:
-    # Pinocchio writes the largest double where the URDF has no limit.
-    return np.where(np.abs(limit) > 1e300, np.copysign(np.inf, limit), limit)
-
-
-def _positive_or_inf(limit: Array) -> Array:
-    limit = _given(np.array(limit, dtype=float))
-    return np.where(limit > 0.0, limit, np.inf)
 
 
 def _movable(tree: ElementTree.Element) -> list[str]:

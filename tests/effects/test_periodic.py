@@ -124,6 +124,18 @@ def test_one_is_said_in_the_singular():
     )
 
 
+@pytest.mark.parametrize(("effect", "said"), [(TorqueRipple(), "a torque ripple of"), (EncoderEccentricity(), "an encoder error with")])  # fmt: skip
+@pytest.mark.parametrize("reduction", [1.0, -1.0])
+def test_where_no_gear_is_stated_the_turn_is_the_joints(
+    effect: TorqueRipple | EncoderEccentricity, said: str, reduction: float
+):
+    """Four periods per turn of a wrist behind a gear that nobody had stated were told as four per motor turn, which they are not."""
+    scene = scene_of(replace(load_robot(), reduction=np.array([reduction, 50.0])))
+    joints = "(a turn of the joint: its reduction is 1)"
+    assert effect.description(scene, Member(0, (4.159,))) == f"{said} 4.159 periods per motor turn {joints}"
+    assert "a turn of the joint" not in effect.description(scene, Member(1, (4.0,)))
+
+
 @pytest.mark.parametrize(
     ("order", "said"),
     [(1.595, ", which would be 2 with a reduction of 79.75"), (2.02, ", which would be 2 with a reduction of 101"), (2.004, ""), (31.4, ""), (0.3, "")],

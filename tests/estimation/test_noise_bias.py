@@ -104,6 +104,26 @@ def test_the_torque_that_the_noise_makes_is_that_of_the_steps():
     assert noise_torque(rough, value) == pytest.approx([np.sqrt(np.mean(row**2)) for row in differs], rel=0.3)
 
 
+def test_what_a_gap_cuts_off_at_the_end_makes_no_noise():
+    """A recording of which 28 samples stood before a gap ended a diagnosis with 'index 57 out-of-bounds in add.reduceat'."""
+    run, other = coarse(13)[0], coarse(13)[2]
+    value = wls(observed([run, other], WIDE)).value
+
+    def without(*lost: slice):
+        kept = np.ones(len(run.time), dtype=bool)
+        for rows in lost:
+            kept[rows] = False
+        return replace(run, time=run.time[kept], position=run.position[:, kept], effort=run.effort[:, kept])
+
+    cut, rest = without(slice(20, 150), slice(-200, -9)), without(slice(0, 150), slice(-200, None))
+    first, *_, last = observed([cut], WIDE).data.stretches
+    assert not first.usable and not last.usable
+    seen, same = observed([cut, other], WIDE), observed([rest, other], WIDE)
+    assert noise_torque(seen, value) == pytest.approx(noise_torque(same, value), rel=0.1)
+    limit = largest_noise_torque(seen, value, 0.01)
+    assert limit == pytest.approx(largest_noise_torque(same, value, 0.01), rel=0.1)
+
+
 def test_the_torque_that_the_noise_makes_is_made_once_for_the_same_parameters(monkeypatch: pytest.MonkeyPatch):
     seen = observed(coarse(13)[:2], WIDE)
     value = wls(seen).value

@@ -50,3 +50,23 @@ def test_far_less_is_half_on_the_joints_that_are_badly_explained() -> None:
     assert far_less(left, mended, np.inf, poor=False) is None
     assert far_less(left, left, np.inf, poor=True) is None
     assert np.isclose(mean(np.array([0.04, np.nan, 0.01])), 0.02)
+
+
+def test_far_less_of_what_is_hardly_explained_counts_where_all_joints_hide_it() -> None:
+    rng = np.random.default_rng(2)
+    shares = np.array([0.1, 0.2, 0.1, 0.3, 1.1, 0.4])
+    blocks = np.exp(0.1 * rng.standard_normal((20, 6))) * shares
+
+    def read(*ratios: float) -> tuple[np.ndarray, np.ndarray]:
+        return blocks * np.array(ratios), shares * np.array(ratios)
+
+    left = read(1, 1, 1, 1, 1, 1)
+    for poor in (True, False):
+        assert np.allclose(far_less(left, read(0.8, 1, 0.8, 0.9, 0.2, 0.9), np.inf, poor=poor) or (), (1.1, 0.22))
+        assert far_less(left, read(0.8, 1, 0.8, 0.9, 0.6, 0.9), np.inf, poor=poor) is None
+        # What it costs the other joints counts too, and so does what it may leave at most.
+        assert far_less(left, read(1.6, 1.6, 1.6, 1.6, 0.2, 1.6), np.inf, poor=poor) is None
+        assert far_less(left, read(0.8, 1, 0.8, 0.9, 0.2, 0.9), 0.2, poor=poor) is None
+    # Of a joint of which half the power is explained an effect may be the reason.
+    left = left[0], shares * np.array([1, 1, 1, 1, 0.6, 1])
+    assert far_less(left, read(0.8, 1, 0.8, 0.9, 0.1, 0.9), np.inf, poor=True) is None

@@ -145,6 +145,8 @@ def test_each_joint_has_its_own_size_the_largest_first():
 def test_of_a_recording_explained_worse_for_no_known_reason_none_is_given():
     whole = Event("run", 0.0, 12.0, ("joint1",), 0.5, "unknown", held_out=True)
     assert whole.sentence(ROBOT) == "run is explained much worse than the fitted recordings: 0.5 N m on joint1"
+    lost = replace(whole, joints=("joint1", "joint2"), sizes=(0.5, 3.0), beyond=("joint2",)).sentence(ROBOT)
+    assert lost.endswith("0.5 N m on joint1; more than the torque itself on joint2: the model does not hold there")
     unsure = replace(whole, kind="parameters unsure").sentence(ROBOT)
     assert unsure.startswith("run is explained much worse than the fitted recordings (parameters unsure): ")
 

@@ -55,6 +55,18 @@ def test_a_sensor_that_was_zeroed_in_a_held_out_recording_is_no_other_payload(tm
         assert [event.kind for event in found.events] == kinds
 
 
+def test_errors_larger_than_the_torque_itself_are_said(tmp_path):
+    """Two fitted runs of one motion told nothing of a third, whose errors were up to 35 times the torque."""
+    robot = load_robot(write_urdf(tmp_path / "arm.urdf", PLANAR_2R))
+    training = zeroed_runs(robot, 0.0)
+    other = replace(training[0], name="other", effort=training[0].effort * np.array([[-1.0], [0.6]]))
+    found = identify(robot, training[1:], validation=[other], model="basic")
+    (event,) = found.events
+    assert set(event.joints) == {"j1", "j2"}
+    assert event.beyond == ("j1",)
+    assert "beyond" not in event.entry
+
+
 @pytest.mark.slow
 def test_a_push_in_a_held_out_recording_is_no_other_payload():
     training = [run(f"run{k}", k) for k in range(4)]

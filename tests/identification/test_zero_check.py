@@ -42,6 +42,15 @@ def test_what_leaves_as_much_is_named() -> None:
     assert "(it does so too with effort and position of" in str(fault)
 
 
+def test_a_joint_that_is_not_explained_at_all_shows_a_zero_where_other_joints_hide_it() -> None:
+    """A measured wrist was left 1.3 of its torque, the other five joints 0.1 to 0.5 in either reading: a counterweight was found."""
+    robot, springs = arm(), np.array([2.0, 2.0, 0.5, 0.2])
+    (fault,) = channel_faults(seen(robot, runs(robot, (0, 0, 2, 0), 0.6, springs)))
+    assert told((fault,)) == [{"4": 2}]
+    assert fault.error > 0.7 and fault.mended < 0.3
+    assert channel_faults(seen(robot, runs(robot, (0, 0, 0, 0), 0.6, springs))) == ()
+
+
 def test_a_zero_nearly_a_quarter_turn_away_is_reported_as_one() -> None:
     """The effect joint_zero finds the rest, with the line for it."""
     robot = arm()

@@ -151,6 +151,23 @@ def test_of_three_the_second_has_to_be_the_slope_of_the_first():
     assert told(table("velocity", "position", "effort"), (2,)) == []
 
 
+@pytest.mark.parametrize("turn", [2.0 * np.pi, 360.0])
+def test_an_angle_that_is_held_within_one_turn_has_the_slope_of_the_whole_one(turn: float):
+    """Of a log of joints that turn on and on, held between half a turn either way, nothing was told."""
+    columns = table("position", "velocity", "effort")
+    last = columns["column_1"][-1]
+    share = columns["column_1"] / last
+    whole = turn * np.array([np.sin(2.0 * share), 2.0 * share**2])
+    slope = turn / last * np.array([2.0 * np.cos(2.0 * share), 4.0 * share])
+    columns |= {f"column_{k + 2}": (row + turn / 2) % turn - turn / 2 for k, row in enumerate(whole)}
+    columns |= {f"column_{k + 4}": row for k, row in enumerate(slope)}
+    assert np.ptp(columns["column_3"]) > 0.9 * turn
+    assert told(columns, (2,))[3:5] == ["velocity 1", "velocity 2"]
+    # What jumps by anything else is no angle, and what is not the slope is none of a whole turn either.
+    assert told(columns | {"column_5": slope[0]}, (2,)) == []
+    assert told(columns | {"column_3": whole[1] % (0.7 * turn)}, (2,)) == []
+
+
 def test_behind_velocities_that_are_slopes_there_may_be_more_of_each_joint():
     """A log of six positions, velocities, currents and two setpoints of each was told nothing."""
     first = ["time None", "position 1", "position 2", "velocity 1", "velocity 2", "effort 1", "effort 2"]

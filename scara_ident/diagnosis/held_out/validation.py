@@ -74,12 +74,19 @@ def validated(outcome: Outcome, data: PreparedData) -> Validation:
         for event in held_out_events(value, outcome.training, after)
     ]
     if outcome.unexplained is not None:
-        # That something stays unexplained is why a whole recording is, and no event.
-        events = [event for event in events if event.kind != "unknown" or np.isfinite(event.score)]
+        events = [event for event in events if says_more(event)]
     quiet = quiet_blocks(held.data, events)
     undisturbed = after if np.all(quiet) else after.faded(quiet)
     gains = held_out_gains(found, model, undisturbed, before, quiet, held.correction)
     return Validation(before, after, tuple(events), undisturbed, gains, unsure, differ.of(shares=quiet), held.notes)
+
+
+def says_more(event: Event) -> bool:
+    """Whether an event says more than that something stays unexplained, which is why a whole recording is.
+
+    It is no reason for errors larger than the torque itself.
+    """
+    return event.kind != "unknown" or bool(np.isfinite(event.score)) or bool(event.beyond)
 
 
 @dataclass(frozen=True, eq=False)

@@ -150,14 +150,15 @@ def position_unit(samples: Samples) -> Checked:
 
 def whole_turns(samples: Samples) -> Checked:
     """Take out the jumps of an angle that is recorded within one turn."""
-    step = np.diff(samples.position, axis=1)
-    # Over a gap an arm may well turn once.
-    near = np.diff(samples.time) < GAP_STEPS * samples.interval
-    wrapped = (np.abs(step) > np.pi) & near & ~samples.robot.prismatic[:, None]
+    step, lasting = np.diff(samples.position, axis=1), np.diff(samples.time)
+    # Over a gap an arm may well turn once, unless it is too slow to turn by half: then it went the shorter way.
+    farthest = speed_limit(samples.robot)[:, None] * lasting
+    near = lasting < GAP_STEPS * samples.interval
+    wrapped = (np.abs(step) > np.pi) & (near | (farthest < np.pi)) & ~samples.robot.prismatic[:, None]
     if not wrapped.any():
         return samples, []
     turns = np.where(wrapped, np.sign(step), 0.0)
-    turns[np.abs(step - 2 * np.pi * turns) > WRAP_REST] = 0.0
+    turns[np.abs(step - 2 * np.pi * turns) > np.where(near, WRAP_REST, farthest)] = 0.0
     found = []
     for joint in np.flatnonzero(turns.any(axis=1)).tolist():
         first = int(np.argmax(turns[joint] != 0)) + 1

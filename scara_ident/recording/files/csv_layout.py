@@ -30,6 +30,7 @@ UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 LONGEST_LINE = 1_000_000
 # Lines that are looked at: more than controllers write before a table.
 LOOKED_AT = 100
+_IDLE_BLANKS = re.compile(rb"^ +| +(?=\r?$)| (?= )", re.MULTILINE)
 _COMMENT = re.compile(r"^\s*[#%]+\s*(?=[^\s,;])")
 
 
@@ -39,11 +40,15 @@ class CsvLayout:
 
     Attributes
     ----------
+    separator : str
+        Where it is a blank, several of them are one, and those at the ends of a line none: see `one_blank`.
     names : tuple of str
         Of the columns, without surrounding blanks, with the unit in brackets where a line of units says one that is not
-        SI; ``column_1``, ``column_2``, ... where no line names them.
+        SI; ``column_3`` for the third where no line names it.
     first : int
         Lines of the file before the first row.
+    cells : int
+        Of a row: more than columns where rows end with a separator, as loggers write that put one behind every number.
     encoding : str
         Of the lines that were looked at, as Python calls it: ``utf-8-sig``, ``cp1252`` (Windows-1252) or ``utf-16``.
     """
@@ -52,6 +57,7 @@ class CsvLayout:
     decimal_comma: bool
     names: tuple[str, ...]
     first: int
+    cells: int
     encoding: str = ENCODINGS[0]
 
 
@@ -67,22 +73,32 @@ def csv_layout(path: Path) -> CsvLayout:
     """
     encoding, places, lines = _decoded(path)
     if not lines:
-        return CsvLayout(",", False, (), 0, encoding)
-    separator, rows, width = _table(lines)
+        return CsvLayout(",", False, (), 0, 0, encoding)
+    separator, rows, cells = _table(lines)
+    width = cells - _empty_ends(rows, cells)
+    rows = [row[:width] if len(row) == cells else row for row in rows]
     header, begin = _header(rows, width)
     if header is None:
-        names = tuple(f"column_{k + 1}" for k in range(len(rows[begin])))
+        names = ("",) * len(rows[begin])
     else:
         units = rows[header + 1] if begin == header + 2 else [""] * len(rows[header])
         names = tuple(
             name if unit in ("", *MISSING) or is_si(unit) else f"{name} [{unit.strip(BRACKETS)}]"
             for name, unit in zip(rows[header], units, strict=True)
         )
+    names = tuple(name or f"column_{k + 1}" for k, name in enumerate(names))
     if max(map(len, names)) > csv.field_size_limit():
         raise csv.Error(f"a name of more than {csv.field_size_limit()} characters")
     first = places[begin] if begin < len(places) else places[-1] + 1
     comma = separator != "," and begin < len(lines) and "," in lines[begin]
-    return CsvLayout(separator, comma, names, first, encoding)
+    return CsvLayout(separator, comma, names, first, len(names) + cells - width, encoding)
+
+
+def one_blank(text: bytes) -> bytes:
+    """Return lines whose cells are apart by blanks, as columns of fixed width are, with one between two and none at the ends."""
+    if not any(mark in text for mark in (b"  ", b" \n", b" \r", b"\n ")) and text == text.strip(b" "):
+        return text
+    return _IDLE_BLANKS.sub(b"", text)
 
 
 def _decoded(path: Path) -> tuple[str, list[int], list[str]]:
@@ -139,8 +155,15 @@ def _table(lines: Sequence[str]) -> tuple[str, list[list[str]], int]:
     return separator, rows, len(rows[0])
 
 
+def _empty_ends(rows: Sequence[Sequence[str]], cells: int) -> int:
+    """Return how many cells at the end of a row are empty in all lines of as many cells, of which some have a number."""
+    full = [row for row in rows if len(row) == cells]
+    last = max((k + 1 for row in full for k, cell in enumerate(row) if cell), default=cells)
+    return cells - last
+
+
 def _cells(line: str, separator: str) -> list[str]:
-    line = line.strip() if separator == " " else line
+    line = one_blank(line.strip().encode()).decode() if separator == " " else line
     # A field longer than Python's parser takes is no name and no number, wherever it ends.
     whole = len(line) <= csv.field_size_limit()
     return next(csv.reader([line], delimiter=separator), []) if whole else line.split(separator)
@@ -163,9 +186,9 @@ def _header(rows: Sequence[Sequence[str]], width: int) -> tuple[int | None, int]
 
 
 def _is_row(row: Sequence[str], width: int) -> bool:
-    """Tell whether a line is numbers and points in time alone, and so no header."""
-    words = [word for word in row if not _is_number(word)]
-    return len(row) == width > 1 and len(words) < len(row) and all(map(is_date, words))
+    """Tell whether a line is numbers, points in time and gaps alone, and so no header."""
+    words = [word for word in row if word not in ("", *MISSING) and not _is_number(word)]
+    return len(row) == width > 1 and _has_number(row) and all(map(is_date, words))
 
 
 def _has_number(row: Sequence[str]) -> bool:

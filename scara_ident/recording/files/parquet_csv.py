@@ -5,19 +5,20 @@ from __future__ import annotations
 import csv
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from io import BytesIO
+from io import BytesIO, TextIOWrapper
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 from scara_ident.arrays import Array
 from scara_ident.errors import RecordingError
 from scara_ident.files import replacing, why_unwritten
 from scara_ident.memory import check_memory
 from scara_ident.quiet import quiet_stderr
-from scara_ident.recording.files.csv_layout import MISSING, CsvLayout, csv_layout
+from scara_ident.recording.files.csv_layout import MISSING, CsvLayout, csv_layout, one_blank
 from scara_ident.recording.files.dates import first_wrong, seconds
 from scara_ident.recording.files.files import check_file
+from scara_ident.recording.files.list_columns import listed_in, names_with_parts, part_of_list
 
 if TYPE_CHECKING:
     import polars as pl
@@ -58,8 +59,8 @@ def column_names(path: Path) -> tuple[str, ...]:
         if path.suffix.lower() == ".csv":
             names = list(csv_layout(path).names)
         else:
-            with path.open("rb") as file, quiet_stderr():
-                names = list(pl.read_parquet_schema(file))
+            with quiet_stderr():
+                names = names_with_parts(path, _schema(path))
     except UnicodeDecodeError as error:
         said = "not a text file in UTF-8, UTF-16 or Windows-1252; save the CSV again in UTF-8"
         raise RecordingError(f"{path}: {said}") from error
@@ -99,10 +100,14 @@ def read_columns(path: Path, names: Sequence[str]) -> dict[str, Array]:
         if path.suffix.lower() == ".csv":
             frame = _read_csv(path, names)
         else:
-            _check_parquet(path, names)
+            schema = _schema(path)
+            parts = listed_in(schema, names)
+            _check_parquet(path, schema, names)
+            columns = list(dict.fromkeys(parts[name][0] if name in parts else name for name in names))
             # What is damaged may make it panic, and say so on its own.
             with quiet_stderr():
-                frame = pl.read_parquet(path, columns=list(names), glob=False, hive_partitioning=False)
+                frame = pl.read_parquet(path, columns=columns, glob=False, hive_partitioning=False)
+            frame = frame.with_columns(part_of_list(schema[name], name, place) for name, place in parts.values())
     except (pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError, UnicodeDecodeError) as error:
         raise damaged_table(path, error) from error
     return {name: numbers(path, frame[name]) for name in names}
@@ -163,11 +168,11 @@ def _read_csv(path: Path, names: Sequence[str]) -> pl.DataFrame:
     }
 
     def schema(kind: type[pl.DataType]) -> dict[str, type[pl.DataType]]:
-        return {str(k): kind if k in how["columns"] else pl.String for k in range(len(layout.names))}
+        return {str(k): kind if k in how["columns"] else pl.String for k in range(layout.cells)}
 
     def read(kind: type[pl.DataType], **more: Any) -> pl.DataFrame:
         # No path: releases of Polars before 2.0 take no columns by place where the name holds signs of a pattern.
-        with BytesIO(path.read_text("utf-16").encode()) if layout.encoding == "utf-16" else path.open("rb") as file:
+        with _lines(path, layout) as file:
             return pl.read_csv(file, schema=schema(kind), **how, **more)
 
     try:
@@ -181,12 +186,28 @@ def _read_csv(path: Path, names: Sequence[str]) -> pl.DataFrame:
     return frame.select(pl.col(str(own)).alias(name) for name, own in place.items())
 
 
-def _check_parquet(path: Path, names: Sequence[str]) -> None:
-    """Refuse, before it is unpacked, a file of too many rows or of columns that are no numbers nor words."""
+def _lines(path: Path, layout: CsvLayout) -> BinaryIO:
+    """Return a CSV file in UTF-8 or what its numbers are alike in, with one separator between two cells."""
+    if layout.encoding == "utf-16":
+        text = path.read_text("utf-16").encode()
+    elif layout.separator == " ":
+        text = path.read_bytes()
+    else:
+        return path.open("rb")
+    return BytesIO(one_blank(text) if layout.separator == " " else text)
+
+
+def _schema(path: Path) -> dict[str, pl.DataType]:
     import polars as pl
 
     with path.open("rb") as file:
-        schema = pl.read_parquet_schema(file)
+        return dict(pl.read_parquet_schema(file))
+
+
+def _check_parquet(path: Path, schema: Mapping[str, pl.DataType], names: Sequence[str]) -> None:
+    """Refuse, before it is unpacked, a file of too many rows or of columns that are no numbers nor words."""
+    import polars as pl
+
     for name in names:
         kind = schema.get(name)
         if kind is not None and not (kind.is_numeric() or kind.is_temporal() or kind == pl.String):
@@ -233,8 +254,8 @@ def numbers(path: Path, series: pl.Series) -> Array:
 
 
 def _refuse_long_rows(path: Path, layout: CsvLayout) -> None:
-    width = len(layout.names)
-    with path.open(encoding=layout.encoding, newline="", errors="replace") as file:
+    width = layout.cells
+    with TextIOWrapper(_lines(path, layout), encoding="utf-8", newline="", errors="replace") as file:
         rows = csv.reader(islice(file, layout.first, None), delimiter=layout.separator)
         # A field longer than Python's parser takes is no number, and said to be none where it is wanted.
         with suppress(csv.Error):

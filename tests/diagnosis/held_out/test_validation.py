@@ -11,9 +11,10 @@ import pytest
 
 from scara_ident.diagnosis import Diagnosis, diagnose
 from scara_ident.diagnosis.evidence.outcome import Outcome
-from scara_ident.diagnosis.held_out.validation import Validation, validated
+from scara_ident.diagnosis.held_out.validation import Validation, says_more, validated
 from scara_ident.effects.friction import PositionDependentFriction
 from scara_ident.estimation.run_offsets import rms_of
+from scara_ident.identification.events import Event
 from scara_ident.motion.prepared import PreparedData
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import load_robot
@@ -57,6 +58,13 @@ def test_a_push_says_nothing_of_an_effect():
     assert abs(other.size - own.size) < 0.5 * own.std
     assert other.std < 1.1 * own.std
     assert other.borne_out()
+
+
+def test_beside_what_stays_unexplained_a_whole_recording_is_named_for_a_reason_or_for_errors_beyond_its_torque():
+    whole = Event("run", 0.0, 12.0, ("joint1",), 0.5, "unknown", held_out=True)
+    assert not says_more(whole)
+    for other in (replace(whole, kind="other payload"), replace(whole, score=3.0), replace(whole, beyond=("joint1",))):
+        assert says_more(other)
 
 
 @pytest.mark.slow

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from scara_ident.errors import RecordingError
 from scara_ident.recording.audit.position import is_computed
 from tests.made_recordings import COUNT, columns
 from tests.recording.audit.made import Read, kinds, only, refusal
@@ -126,6 +127,27 @@ def test_over_a_gap_an_arm_may_turn(read, robot):
     recording = read(made, endless)
     assert only(recording, "gap").count == 1
     np.testing.assert_array_equal(recording.position[0], made["joint1.position"])
+
+
+def test_over_a_gap_too_short_for_half_a_turn_an_angle_is_unwrapped(read, robot):
+    """Refused as 'jumps by 6.01 rad and stays, as after a reset of the encoder': it passed half a turn while samples were lost."""
+    endless = replace(robot, lower=np.full(2, -np.inf), upper=np.full(2, np.inf))
+    assert np.all(endless.velocity_limit == 3.77)
+    made = columns()
+    fast = 100 + int(np.argmax(np.abs(np.diff(made["joint1.position"][100:-100]))))
+    lost = slice(fast - 10, fast + 10)
+    truth = np.delete(made["joint1.position"], lost) + np.pi - made["joint1.position"][fast]
+    made = {name: np.delete(values, lost) for name, values in made.items()}
+    made["joint1.position"] = np.angle(np.exp(1j * truth))
+    step = np.abs(np.diff(made["joint1.position"]))[fast - 11]
+    assert 5.5 < step < 6.25
+    recording = read(made, endless)
+    assert "wrapped" in kinds(recording) and "gap" in kinds(recording)
+    np.testing.assert_allclose(recording.position[0] - recording.position[0, 0], truth - truth[0], atol=1e-12)
+    # What is left of a step when the turn is taken off has to be a way that the joint can have gone.
+    made["joint1.position"][fast - 10 :] -= np.sign(made["joint1.position"][fast - 10]) * 2.0
+    with pytest.raises(RecordingError, match="as after a reset of the encoder"):
+        read(made, endless)
 
 
 def test_a_few_wild_positions_are_left_out_and_said(read):

@@ -48,6 +48,57 @@ def test_the_rows_tell_what_stands_before_them(tmp_path, before, names, first):
     assert (found.separator, found.decimal_comma, found.names, found.first) == (",", False, names, first)
 
 
+@pytest.mark.parametrize(
+    "write",
+    [
+        lambda row: " ".join(row) + " ",
+        lambda row: " " + " ".join(row),
+        lambda row: "".join(f"{word:>12}" for word in row),
+        lambda row: "".join(f"{word:<12}" for word in row),
+        lambda row: ", ".join(row) + ",",
+        lambda row: ",".join(row) + ", ,",
+        lambda row: "".join(f"{word}\t" for word in row),
+        lambda row: "".join(f"{word};" for word in row),
+    ],
+)
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+@pytest.mark.parametrize("head", [None, "also", "plain"])
+def test_separators_at_the_ends_of_a_line_and_several_blanks_are_no_columns(tmp_path, write, end, head):
+    rows = [line.split(",") for line in ROWS]
+    names = HEAD.split(",")
+    separator = next((mark for mark in ",\t;" if mark in write(names)), " ")
+    first = {None: [], "also": [write(names)], "plain": [separator.join(names)]}[head]
+    path = tmp_path / "log.csv"
+    path.write_bytes(end.join([*first, *map(write, rows), ""]).encode())
+    names = names if head else ["column_1", "column_2", "column_3"]
+    assert csv_layout(path).names == tuple(names)
+    found = read_columns(path, names)
+    np.testing.assert_array_equal(np.array([found[name] for name in names]).T, np.array(rows, float))
+
+
+def test_rows_with_gaps_need_no_header_and_columns_without_a_name_are_called_by_their_place(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(["0.0,,2", *ROWS]))
+    assert csv_layout(path).names == ("column_1", "column_2", "column_3")
+    np.testing.assert_array_equal(read_columns(path, ["column_2"])["column_2"], [np.nan, 1.5, 1.25, 1.0])
+    # A spreadsheet saves what it has beside the table too, and a data frame the number of the row.
+    path.write_text("\n".join([f",{HEAD},,", *(f"{k},{row},," for k, row in enumerate(ROWS))]))
+    assert csv_layout(path).names == ("column_1", "time", "q", "tau")
+    path.write_text("\n".join([f"{HEAD},,", *(f"{row},,{k}" for k, row in enumerate(ROWS))]))
+    assert csv_layout(path).names == ("time", "q", "tau", "column_4", "column_5")
+    np.testing.assert_array_equal(read_columns(path, ["column_5"])["column_5"], [0.0, 1.0, 2.0])
+    # Of a signal that begins later there are no numbers at first, but a name.
+    path.write_text("\n".join([f"{HEAD},late", *(f"{row}," for row in ROWS), "0.3,1,2,7"]))
+    np.testing.assert_array_equal(read_columns(path, ["late"])["late"], [np.nan, np.nan, np.nan, 7.0])
+
+
+def test_a_line_too_long_is_found_behind_several_blanks_too(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(["  time  q", *(f"   {k}   0.5 " for k in range(9)), "  9  0.5  1.0 "]))
+    with pytest.raises(RecordingError, match="row 10 has 3 values for 2 columns"):
+        read_columns(path, ["time", "q"])
+
+
 def test_a_line_of_units_in_brackets_keeps_one_pair_of_them(tmp_path):
     path = tmp_path / "log.csv"
     path.write_text("\n".join([HEAD, "(ms),(deg),(Nm)", *ROWS]))
