@@ -27,7 +27,7 @@ from scipy.linalg import block_diag
 from scipy.special import ndtr
 
 from scara_ident.arrays import Array
-from scara_ident.fleet.causes import TOLD_RUNS
+from scara_ident.fleet.causes import REPORTED_RUN_KINDS
 from scara_ident.fleet.changes import FALSE_CHANGE_LEVEL, arms_counted, min_probability, trials_of
 from scara_ident.fleet.fleet import changes_of
 from scara_ident.fleet.folder import list_fleet
@@ -80,7 +80,7 @@ def design() -> Design:
 def daily() -> Array:
     """Return a root of the covariance of `scara_ident.fleet.causes.RUN_KINDS`, joint by joint: all friction of a joint together."""
     each = [(DAILY[0], DAILY[1], DAILY[2] * noise, DAILY[3]) for noise in virtual_arm().torque_noise]
-    return block_diag(*(TOLD_RUNS * std for std in each))
+    return block_diag(*(REPORTED_RUN_KINDS * std for std in each))
 
 
 def drawn(known: Design, random: np.random.Generator, faulty: bool) -> Array:

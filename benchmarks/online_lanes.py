@@ -15,7 +15,7 @@ from scara_ident.estimation.information import triangular
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.motion import Motion
 from scara_ident.online import OnlineSettings
-from scara_ident.online.detector import TOLD, threshold
+from scara_ident.online.detector import DETERMINED, threshold
 from scara_ident.online.identifier import REST_SHARE
 from scara_ident.online.noise import GIVEN_SAMPLES, NOISE_SAMPLES
 from scara_ident.online.state import Memory
@@ -157,7 +157,7 @@ def _white(scores: Array, information: Array) -> Array:
     """Return what `scara_ident.online.detector.white_scores` does, of every lane."""
     size = np.sqrt(np.maximum(np.einsum("lii->li", information), np.finfo(float).tiny))
     values, vectors = np.linalg.eigh(information / (size[:, :, None] * size[:, None, :]))
-    told = values > TOLD * np.maximum(values[:, -1:], np.finfo(float).tiny)
+    told = values > DETERMINED * np.maximum(values[:, -1:], np.finfo(float).tiny)
     root = np.where(told, 1.0 / np.sqrt(np.where(told, values, 1.0)), 0.0)
     aims = np.einsum("lij,li->lj", vectors, scores / size)
     return np.asarray(np.einsum("lij,lj->li", vectors, root * aims))

@@ -12,6 +12,7 @@ import numpy as np
 from scara_ident.arrays import Array
 from scara_ident.export.c_header import c_header, c_name
 from scara_ident.export.casadi_module import casadi_module
+from scara_ident.export.conventions import convention_lines
 from scara_ident.export.forms import FORMS, Said, friction_said, offset_said, possible_standard, said_by, with_code
 from scara_ident.export.friction import JointFriction, JointSideFriction, joint_side
 from scara_ident.export.identified_model import IdentifiedModel
@@ -117,7 +118,7 @@ def said_lines(word: str, said: Said) -> list[str]:
 
 
 def about_lines(found: IdentifiedModel, said: Said) -> tuple[str, ...]:
-    """Say what a file's reader should know: errors, and what is missing."""
+    """Say what a file's reader should know: errors, what is missing, directions and sides."""
     kind = "held out" if found.held_out[0] == "validation" else "on the fitted recordings"
     model, own = found.errors(found.value), found.errors(said.value)
     lines = [
@@ -125,7 +126,8 @@ def about_lines(found: IdentifiedModel, said: Said) -> tuple[str, ...]:
         for j, name in enumerate(found.robot.joints)
     ]
     lines += [f"{note[0].upper()}{note[1:]}." for note in _open(found)]
-    return (*lines, *(f"Not exported: {what}: {why}." for what, why in said.missing))
+    missing = (f"Not exported: {what}: {why}." for what, why in said.missing)
+    return (*lines, *missing, *convention_lines(found.robot))
 
 
 def _open(found: IdentifiedModel) -> tuple[str, ...]:

@@ -10,6 +10,7 @@ from scara_ident.arrays import Array
 from scara_ident.export.identified_model import IdentifiedModel
 from scara_ident.model.terms import Friction, Offset
 from scara_ident.motion.motion import Motion
+from scara_ident.robot.robot import Robot
 
 WORDS = ("coulomb", "viscous", "quadratic", "cubic")
 # Poses over which a joint's inertia is averaged for the gains that a loop may begin with, and that loop's frequency, Hz.
@@ -20,8 +21,9 @@ def ros2_text(found: IdentifiedModel, value: Array, armature: Array, urdf: str, 
     """Write the parameters as YAML.
 
     ``joint_trajectory_controller`` commands effort, with viscous friction fed forward and gains to begin with: those of a
-    critically damped loop of `LOOP` Hz on each joint's mean inertia. ``computed_torque`` has what a controller needs that
-    computes torque from the URDF beside it: ``rnea`` of the links, armature, friction by powers of speed, offset.
+    critically damped loop of `LOOP` Hz on each joint's mean inertia, below 0 where the gear reverses. ``computed_torque`` has
+    what a controller needs that computes torque from the URDF beside it: ``rnea`` of the links, armature, friction by powers of
+    speed, offset. The equation that they belong to is written above it.
 
     Parameters
     ----------
@@ -54,14 +56,15 @@ def ros2_text(found: IdentifiedModel, value: Array, armature: Array, urdf: str, 
             offset = term.of_joints(own).tolist()
     inertia = _mean_inertia(found, value)
     pace = 2.0 * np.pi * LOOP
+    # Where the gear reverses, a torque of the motor moves the joint the other way.
     gains = {
         name: {
-            "p": float(pace**2 * inertia[j]),
+            "p": float(sign * pace**2 * inertia[j]),
             "i": 0.0,
-            "d": float(2.0 * pace * inertia[j]),
-            "ff_velocity_scale": friction["viscous"][j] * float(abs(robot.drive_sign[j])),
+            "d": float(sign * 2.0 * pace * inertia[j]),
+            "ff_velocity_scale": float(sign * friction["viscous"][j]),
         }
-        for j, name in enumerate(joints)
+        for j, (name, sign) in enumerate(zip(joints, robot.drive_sign, strict=True))
     }
     content = {
         "joint_trajectory_controller": {
@@ -88,8 +91,22 @@ def ros2_text(found: IdentifiedModel, value: Array, armature: Array, urdf: str, 
             }
         },
     }
-    head = "".join(f"# {line}\n" for line in about)
+    head = "".join(f"# {line}\n" for line in (*about, *_equation(robot)))
     return head + yaml.dump(content, Dumper=Plain, sort_keys=False, default_flow_style=None, width=120)
+
+
+def _equation(robot: Robot) -> tuple[str, ...]:
+    """Say what the numbers of ``computed_torque`` and the gains are, one line each."""
+    motor = robot.effort_side == "motor"
+    unit = "[N m]" if motor or not robot.prismatic.any() else "[N m], or force [N] of a joint that slides,"
+    load, turn = ("/ reduction", "sign(reduction) * ") if motor else ("", "")
+    return (
+        f"Torque {unit} on the {robot.effort_side} side, of q [rad or m], v and a per second:",
+        f"  (rnea(q, v, a) + armature * a) {load}".rstrip(),
+        f"  + {turn}(coulomb * sign(v) + viscous * v + quadratic * v * |v| + cubic * v^3) + offset",
+        "Gains and effort_limit are those of this torque. Divided by effort_gain it is in the unit that was recorded.",
+        "An effort_limit of 0 is one that the URDF does not state.",
+    )
 
 
 def _mean_inertia(found: IdentifiedModel, value: Array) -> Array:

@@ -103,9 +103,10 @@ def find_changes(history: History, scatter: Scatter, tried: float) -> tuple[Chan
         trials = [trial for trial in ordered if np.any(_moved(history, first, trial) > unknown)]
         if not trials or trials[0].p_value * tried >= FALSE_CHANGE_LEVEL:
             break
-        best, sizes = trials[0], history.causes[trials[0].cause].sizes
+        best = _best_of(trials, history.causes, scatter.freedom, tried)
+        sizes, others = history.causes[best.cause].sizes, [item for item in trials if item is not best]
         enough = sizes * float(fdtri(sizes, scatter.freedom, 1.0 - AS_GOOD))
-        alike = tuple(history.causes[item.cause] for item in trials[1:] if best.explained - item.explained < enough)
+        alike = tuple(history.causes[item.cause] for item in others if best.explained - item.explained < enough)
         found = _needed([*found, _Named(best, best, alike)], first, history.causes, tried)
         search = first.beside(found)
     named = []
@@ -118,6 +119,23 @@ def find_changes(history: History, scatter: Scatter, tried: float) -> tuple[Chan
         chance, since = min(1.0, beside.p_value * tried), history.dates[start]
         named.append(Change(cause, cause.joint, since, gradual, beside.size, beside.covariance, chance, item.alike))
     return tuple(named)
+
+
+def _best_of(trials: Sequence[_Trial], causes: Sequence[Cause], freedom: float, tried: float) -> _Trial:
+    """Return the best explanation of trials in order: the first, or one of more sizes that explains surely more than it.
+
+    With few degrees of freedom the probabilities of large changes are those of a scatter that would have to be far larger than
+    it seems, and one size comes before many, however much it leaves. If the first were all that changed, one of d sizes more
+    would explain d more than it, in units of the noise.
+    """
+    from scipy.special import fdtrc
+
+    best = trials[0]
+    for item in trials[1:]:
+        sizes, more = causes[item.cause].sizes - causes[best.cause].sizes, item.explained - best.explained
+        if sizes > 0 and float(fdtrc(sizes, freedom, more / sizes)) * tried < FALSE_CHANGE_LEVEL:
+            best = item
+    return best
 
 
 def _needed(found: Sequence[_Named], first: _Search, causes: Sequence[Cause], tried: float) -> list[_Named]:

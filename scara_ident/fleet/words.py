@@ -40,7 +40,9 @@ def _sentence(changes: Sequence[Change], scene: Scene) -> str:
     )
     alike = ", ".join(dict.fromkeys(other.words for item in changes for other in item.or_else[:3]))
     other = f"; it could also be {alike}" if alike else ""
-    return f"{words[0].upper()}{words[1:]}{':' if cause.candidate else ''}{each}{other}"
+    total = sum(float(item.size[0]) for item in changes)
+    turned = "; its sign is reversed" if cause.effect == "torque_scale" and total < -1.0 else ""
+    return f"{words[0].upper()}{words[1:]}{':' if cause.candidate else ''}{each}{turned}{other}"
 
 
 def _size(change: Change, cause: Cause, scene: Scene, *, again: bool = False) -> str:

@@ -18,8 +18,10 @@ from scara_ident.use.contact_samples import PEAK_SHARE
 from scara_ident.use.external_torque import FEATURES, Observed
 from scara_ident.use.observer import ContactObserver
 
-# A joint is named with a contact if its mean reaches this share of its threshold while the contact is strong.
+# A joint that moves is named with a contact if its mean reaches this share of its threshold while the contact is strong. One
+# that stands still has to reach all of it: friction holds it at any torque up to there.
 NAMED = 0.5
+_AT_REST = FEATURES.index("at rest")
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +78,7 @@ class Contact:
         along = self.force / size
         # Along an axis that is not determined the force is zero.
         std = float(np.sqrt(along @ np.nan_to_num(self.force_covariance) @ along))
-        return f"{size:.3g} ± {std:.1g} N"
+        return f"{size:.3g} ± {float(f'{std:.1g}'):g} N"
 
     @property
     def point_words(self) -> str:
@@ -123,8 +125,9 @@ def _contact(observer: ContactObserver, observed: Observed, threshold: Array, sh
     strong = inside[size >= PEAK_SHARE * float(np.max(size))]
     # Means, so that no peak of the noise names a joint.
     mean = np.mean(observed.torque[:, strong], axis=1)
-    most = np.abs(mean) / np.mean(threshold[:, strong], axis=1)
-    named = [int(j) for j in np.argsort(-most) if most[j] >= min(NAMED, float(np.max(most)))]
+    still = np.mean(observed.features[:, _AT_REST, strong], axis=1)
+    most = np.abs(mean) / ((NAMED + (1.0 - NAMED) * still) * np.mean(threshold[:, strong], axis=1))
+    named = [int(j) for j in np.argsort(-most) if most[j] >= min(1.0, float(np.max(most)))]
     estimate = contact_force(observer, observed, threshold, inside, strong)
     if estimate.at_tool and len(named) < min(MIN_JOINTS, robot.n):
         estimate = ContactForce(estimate.explained, False)

@@ -7,11 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from scara_ident.fleet.causes import Cause
 from scara_ident.fleet.changes import (
     FALSE_CHANGE_LEVEL,
+    _best_of,
     _Named,
     _needed,
     _search,
+    _Trial,
     find_changes,
     grown_residuals,
     residual_scatter,
@@ -70,6 +73,26 @@ def test_a_cause_that_changes_twice_has_the_size_of_each_step(histories):
     # Their standard deviations are 0.0002: friction differs from date to date.
     sizes = {item.since: pytest.approx(item.size[0], abs=0.002) for item in found}
     assert sizes == {DATES[1]: 0.05, DATES[3]: 0.25}
+
+
+def test_many_sizes_come_before_one_that_leaves_most_of_a_large_change():
+    """A payload of a UR5 was named as torque scales of its elbow and shoulder and a spring, with 19.2 degrees of freedom."""
+
+    def cause(sizes: int) -> Cause:
+        return Cause("", None, "", (), ("1",) * sizes)
+
+    def trial(place: int, explained: float) -> _Trial:
+        return _Trial(place, 0, explained, 0.0, 0.0, np.zeros(1), np.zeros((1, 1)))
+
+    one, many = cause(1), cause(40)
+    scale, payload = trial(0, 395514.0), trial(1, 2256536.0)
+    assert _best_of([scale, payload], (one, many), 19.2, 400.0) is payload
+    # What chance makes of forty sizes is no reason.
+    assert _best_of([scale, trial(1, scale.explained + 80.0)], (one, many), 19.2, 400.0) is scale
+    # Nor is a cause of as many sizes that explains more: it is in order already.
+    assert _best_of([scale, trial(1, 2.0 * scale.explained)], (one, one), 19.2, 400.0) is scale
+    # A sign that was swapped is one torque scale, and no masses explain as much.
+    assert _best_of([trial(0, 811686.0), trial(1, 534932.0)], (one, many), 19.2, 400.0).cause == 0
 
 
 def test_what_came_first_is_not_named_where_a_later_cause_leaves_nothing_of_it(histories, noise):

@@ -33,6 +33,11 @@ def test_a_change_is_said_with_size_uncertainty_and_date(histories):
     inertia = next(label for label, cause in causes.items() if cause.effect == "inertia")
     count = causes[inertia].sizes
     assert "masses and inertias" in of(inertia, [1.0] + [0.0] * (count - 1), [1e-2] * count).lower()
+    scale = "torque scale of joint1"
+    assert of(scale, [-2.0], [4e-6]) == (
+        "Torque scale of joint1 down 200 % (± 0.2 %) since 1 March 2026; its sign is reversed"
+    )
+    assert "reversed" not in of(scale, [-0.5], [4e-6]) + of(coulomb, [-1.2], [1e-2])
     unknown = of(coulomb, [2.0], [0.01], cause=None)
     assert unknown == "Residual of joint2 up 200 % (± 10 %) since 1 March 2026; no known cause explains it"
 

@@ -39,6 +39,21 @@ def quiet(seed: int, seconds: float = 20.0) -> Recording:
     return recording(robot, f"quiet{seed}", time, q, torque, velocity=v)
 
 
+def stopping(seed: int, seconds: float = 20.0) -> Recording:
+    """A run that stands still for half of every four seconds, each joint held by any friction up to its Coulomb friction."""
+    robot, rng = ur5(), np.random.default_rng(seed)
+    time = np.arange(round(seconds * RATE)) / RATE
+    pace = np.maximum(0.0, np.sin(0.5 * np.pi * time)) ** 2
+    passed = np.cumsum(pace) / RATE
+    q, v, a = sines(rng, passed, robot.n, size=0.5)
+    a, v = a * pace**2 + v * np.gradient(pace, time), v * pace
+    rest = pace == 0.0
+    held = rng.uniform(-FRICTION[0][0], FRICTION[0][0], (robot.n, round(seconds / 4.0) + 1))
+    friction = np.where(rest, held[:, (time / 4.0).astype(int)], 0.0)
+    torque = recorded_torque(robot, q, v, a, FRICTION) + friction + 0.1 * NOISE * rng.standard_normal(q.shape)
+    return recording(robot, f"stopping{seed}", time, q, torque, velocity=v)
+
+
 def moved_from(run: Recording, pose: np.ndarray, size: float) -> Recording:
     """The same motion, so much smaller and about another pose, with velocities but without friction's error."""
     robot = ur5()

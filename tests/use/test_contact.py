@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from scara_ident.files import json_text
-from scara_ident.use.contact import contacts_dict, look_for_contact, sentences
+from scara_ident.use.contact import Contact, contacts_dict, look_for_contact, sentences
+from scara_ident.use.contact_force import ContactForce
 from scara_ident.use.observer import ContactObserver, contact_observer
-from tests.use.quiet import known_ur5, moved_from, pushed, quiet
+from tests.use.quiet import known_ur5, moved_from, pushed, quiet, stopping
 
 FORCE = np.array([30.0, -20.0, 40.0])
 
@@ -52,6 +53,19 @@ def test_what_loads_inner_joints_only_is_on_their_link(observer: ContactObserver
 
 
 @pytest.mark.slow
+def test_a_joint_that_stands_still_by_friction_is_not_loaded_by_a_contact():
+    # Friction holds each joint at any torque up to its threshold: of a push farther in nothing shows on the wrist.
+    own = contact_observer(known_ur5(), [stopping(seed) for seed in range(10)], rate=10.0)
+    found = look_for_contact(own, [pushed(stopping(seed), FORCE, 6.2, 7.8, joints=2) for seed in range(20, 32)])
+    during = [each for each in found.contacts if 6.2 <= each.start < 7.8]
+    assert len(during) >= 10
+    assert {each.place for each in during} <= {"shoulder_link", "upper_arm_link"}
+    # Where it moves, the same push on all joints is on the tool.
+    whole = look_for_contact(own, [pushed(stopping(20), FORCE, 4.4, 5.6)]).contacts
+    assert "tool" in {each.place for each in whole if 4.4 <= each.start < 5.0}
+
+
+@pytest.mark.slow
 def test_stated_forces_are_as_sure_as_they_say(observer: ContactObserver):
     rng = np.random.default_rng(3)
     off, stds = [], []
@@ -69,6 +83,11 @@ def test_stated_forces_are_as_sure_as_they_say(observer: ContactObserver):
     # if it were the same throughout.
     assert np.sqrt(np.mean(np.square(off))) > 0.1
     assert np.median(stds) < 0.2 * 60.0
+
+
+def test_a_force_that_is_hardly_known_is_said_without_an_exponent():
+    estimate = ContactForce(0.9, True, np.array([0.0, 12.0, 0.0]), np.diag([1.0, 900.0, 1.0]))
+    assert Contact("run", 1.0, 1.2, ("joint",), 1.1, np.zeros(1), "tool", estimate).force_words == "12 ± 30 N"
 
 
 @pytest.mark.slow
