@@ -260,7 +260,8 @@ def test_a_ripple_of_too_few_periods_is_reported_and_not_believed():
     assert [item.joint for item in result.evidence if "excite it too little" in item.why] == ["joint1"]
     told = {item.effect: item.why for item in result.tentative}
     assert set(told) == {"torque_ripple", "spring"}
-    assert told["spring"].startswith("a torque ripple of 1 period per motor turn explains more in its place")
+    ripple = "a torque ripple of 1 period per motor turn (a turn of the joint: its reduction is 1)"
+    assert told["spring"].startswith(f"{ripple} explains more in its place")
     straight = diagnose(robot, with_torque(exact_runs(), 0, spring), bands=BANDS, catalogue=(Spring(), TorqueRipple()))
     assert [(item.effect, item.confounded_with) for item in straight.effects] == [("spring", ())]
 
