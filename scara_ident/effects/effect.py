@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
-from scara_ident.effects.following import EstimateSlopes, slopes_by_differences
+from scara_ident.effects.following import EstimateSlopes, LinkSlopes, link_slopes_by_differences, slopes_by_differences
 from scara_ident.effects.parameters import (
     OWN,
     Coefficient,
@@ -165,6 +165,10 @@ class Effect(ABC):
         for x, column in zip(value.tolist(), self._named(signals, member), strict=True):
             found[member.place if np.ndim(column) == 1 else slice(None)] += x * column
         return found
+
+    def link_slopes(self, signals: Signals, member: Member, value: Array, joint: int) -> LinkSlopes:
+        """Return the derivatives of `torque_on_links` by the position of a joint, (n, N), and unless `of_position` by its velocity and acceleration."""
+        return link_slopes_by_differences(self, signals, member, value, joint)
 
     def _named(self, signals: Signals, member: Member) -> list[Array]:
         """Return the columns of a member, one for each that `columns` describes."""
@@ -338,10 +342,7 @@ class Effect(ABC):
         raise NotImplementedError(f"{self.name} is tied and has no slopes")
 
     def estimate_slopes(self, signals: Signals, member: Member, value: Array) -> EstimateSlopes:
-        """Return the derivatives of an untied member's torque, its coefficients (k,) held, by the base model's parameters.
-
-        Used for a family with `follows_estimate`. By default differences of its columns are used, which takes longer.
-        """
+        """Return the derivatives of an untied member's torque, coefficients (k,) held, by the base model's parameters, which its columns follow."""
         return slopes_by_differences(self, signals, member, value)
 
     def instead(self, scene: Scene, member: Member) -> tuple[tuple[Member, Member], ...]:

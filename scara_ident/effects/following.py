@@ -1,4 +1,4 @@
-"""Effects whose columns depend on the estimate: how their torque changes with the parameters that they depend on.
+"""How the torque of effects changes with what it depends on: the parameters of the base model, and the motion of the links.
 
 Such a torque is a product of coefficients and of the base model's parameters, and both are estimated. The columns say how it
 changes with the coefficients. How it changes with the parameters is said here: what is unsure of these is then in what is
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scara_ident.arrays import Array
 from scara_ident.effects.parameters import Member
 from scara_ident.effects.signals import Signals
+from scara_ident.motion.motion import Motion
 
 if TYPE_CHECKING:
     from scara_ident.effects.effect import Effect
@@ -24,10 +25,17 @@ if TYPE_CHECKING:
 # Step of a difference, as a share of a joint's largest torque: columns are linear or nearly so, and rounding is far below.
 STEP = 1e-5
 
+# Step that differentiates a torque by position, rad or m: near the cube root of rounding, where a central difference errs least.
+POSITION_STEP = 1e-5
+# Step that differentiates it by velocity, as a share of the largest speed or 1; it is quadratic, so that any is exact.
+SPEED_STEP = 1e-4
+
 # Places among the base model's parameters, shape (m,), and derivatives by these, shape (m, N).
 Slopes: TypeAlias = tuple[NDArray[np.intp], Array]
 # Of each joint that they act on, by its place; derivatives by all other parameters are zero.
 EstimateSlopes: TypeAlias = Mapping[int, Slopes]
+# Derivatives by the position of a joint, shape (n, N), and its velocity and acceleration where the torque depends on these.
+LinkSlopes: TypeAlias = tuple[Array] | tuple[Array, Array, Array]
 
 
 def predicted_slopes(signals: Signals, joint: int) -> Slopes:
@@ -69,3 +77,25 @@ def slopes_by_differences(effect: Effect, signals: Signals, member: Member, valu
             for joint, columns in effect.by_joint(there, member).items():
                 found[joint][k] += side / (2.0 * step) * (value @ np.array(columns))
     return {joint: (acting, rows) for joint, rows in found.items()}
+
+
+def link_slopes_by_differences(
+    effect: Effect, signals: Signals, member: Member, value: Array, joint: int
+) -> LinkSlopes:
+    """Return `Effect.link_slopes` of any family, by differences of its torque."""
+    motion = signals.motion
+
+    def torque(k: int, step: float) -> Array:
+        q, v, a = state = (motion.q.copy(), motion.v.copy(), motion.a.copy())
+        state[k][joint] += step
+        moved = Motion(motion.name, motion.trajectory, motion.time, q, v, a, None, motion.rate)
+        return effect.torque_on_links(Signals(signals.scene, moved), member, value)
+
+    def differentiated(k: int, step: float) -> Array:
+        return (torque(k, step) - torque(k, -step)) / (2.0 * step)
+
+    by_q = differentiated(0, POSITION_STEP)
+    if effect.of_position:
+        return (by_q,)
+    by_v = differentiated(1, SPEED_STEP * max(float(np.max(np.abs(motion.v))), 1.0))
+    return by_q, by_v, torque(2, 1.0) - effect.torque_on_links(signals, member, value)

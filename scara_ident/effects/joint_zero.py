@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.effects.effect import Effect
-from scara_ident.effects.links import POSITION_STEP, rigid_rows, rigid_slopes, rigid_torque
+from scara_ident.effects.following import POSITION_STEP
+from scara_ident.effects.links import rigid_rows, rigid_slopes, rigid_torque
 from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, Tie, View
 from scara_ident.effects.signals import Scene, Signals
 from scara_ident.effects.spanned import Span, random_motion, rows_by_sample

@@ -1,4 +1,4 @@
-"""Rigid-body torques when gravity, a payload or a joint's position differs from what the model takes."""
+"""Rigid-body torques when a payload or a joint's position differs from what the model takes."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from typing import Any, TypeVar
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.effects.signals import Scene, Signals
@@ -17,17 +16,12 @@ from scara_ident.model.regressor.derivative import derivative
 from scara_ident.model.regressor.kernel import RegressorKernel, build_kernel
 from scara_ident.model.regressor.recursion import joint_geometry
 from scara_ident.model.regressor.torque import trace_torque
+from scara_ident.model.regressor.vectors import floats
 from scara_ident.model.terms import RigidBody
 from scara_ident.motion.motion import Motion
 from scara_ident.robot.kinematics import place_of, tool_frame
 from scara_ident.robot.robot import Robot
 
-# Where a robot's gravity is zero this is how large it is once the base tilts.
-STANDARD_GRAVITY = 9.81
-# Step that differentiates the torque by position, rad or m: near the cube root of rounding, where a central difference errs least.
-POSITION_STEP = 1e-5
-# Step that differentiates it by velocity, as a share of the largest speed or 1; it is quadratic, so that any is exact.
-SPEED_STEP = 1e-4
 # A joint's inertia in its most folded pose is more than this share of its mean, or the estimate of it is a poor one.
 MIN_FOLDED_SHARE = 0.02
 # A link's inertia stays above this share of its usual one, however folded, where the estimate is a poor one.
@@ -57,75 +51,6 @@ def forget_shared(motion: Motion) -> None:
     """Forget what members share of a motion; it is made again where it is asked for."""
     _SHARED.pop(motion.kinematics, None)
     _SLOPES.pop(motion.kinematics, None)
-
-
-def gravity_size(robot: Robot) -> float:
-    """Return the size of gravity, m/s^2."""
-    return float(np.linalg.norm(robot.model.gravity.linear)) or STANDARD_GRAVITY
-
-
-def pinocchio_columns(robot: Robot, standard: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return Pinocchio's places of the bodies' standard parameters, which stand in the robot's order of joints."""
-    return np.asarray(10 * robot.order[standard // 10] + standard % 10, dtype=np.intp)
-
-
-def first_moments(robot: Robot) -> NDArray[np.intp]:
-    """Return the standard parameters that gravity acts on, shape (4 n,): mass and first moments of every body."""
-    return np.asarray((10 * np.arange(robot.n)[:, None] + np.arange(4)).ravel(), dtype=np.intp)
-
-
-def sideways(robot: Robot) -> tuple[tuple[str, Array], tuple[str, Array]]:
-    """Return the two directions across gravity, which are those that a base turns it in, and the base's axis nearest each.
-
-    Of a base that stands they are x and y. Of another they are the axes that gravity is least along, in their order, made
-    perpendicular to it and to each other (Gram and Schmidt): each a name and a unit vector of shape (3,) in the base's frame.
-    """
-    gravity = np.asarray(robot.model.gravity.linear, dtype=float)
-    size = float(np.linalg.norm(gravity))
-    down = gravity / size if size > 0.0 else np.array([0.0, 0.0, -1.0])
-    found: list[tuple[str, Array]] = []
-    for axis in np.delete(np.arange(3), np.argmax(np.abs(down))):
-        along = np.eye(3)[axis]
-        for other in (down, *(vector for _, vector in found)):
-            along = along - (along @ other) * other
-        found.append(("xyz"[axis], along / np.linalg.norm(along)))
-    return found[0], found[1]
-
-
-@lru_cache(maxsize=8)
-def gravity_kernels(robot: Robot) -> tuple[RegressorKernel, RegressorKernel]:
-    """Return the kernels of the torque that gravity along minus each of `sideways` gives the `first_moments`."""
-    columns = pinocchio_columns(robot, first_moments(robot))
-    kernels = []
-    for _, direction in sideways(robot):
-        model = robot.model.copy()
-        model.gravity.linear = -gravity_size(robot) * direction
-        kernels.append(build_kernel(model, columns))
-    return kernels[0], kernels[1]
-
-
-def gravity_columns(robot: Robot, axis: int, q: Array) -> Array:
-    """Return the torque per mass and first moment under gravity along minus one of two directions across that of the robot.
-
-    Parameters
-    ----------
-    axis : {0, 1}
-        Which of `sideways`.
-    q : ndarray, shape (n, N)
-
-    Returns
-    -------
-    ndarray, shape (n, 4 n, N)
-        Recorded side; parameters as `first_moments`.
-    """
-    return gravity_torque(robot, axis, q, np.eye(4 * robot.n))
-
-
-def gravity_torque(robot: Robot, axis: int, q: Array, moments: Array) -> Array:
-    """Return the torque, shape (n, k, N), of each of k sets of masses and first moments (k, 4 n), as `gravity_columns`."""
-    rest = np.zeros_like(q)
-    columns = gravity_kernels(robot)[axis](q[np.argsort(robot.order)], rest, rest)
-    return np.asarray((moments @ columns)[robot.order] * robot.row_scale[:, None, None])
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,7 +107,9 @@ def _traced_torque(term: RigidBody, value: Array, motion: Motion) -> Array:
     q, v, a = (part[back, 0].tolist() for part in (motion.q, motion.v, motion.a))
     standard = term.standard(value)
     bodies, armature = standard[: 10 * robot.n].reshape(-1, 10), standard[10 * robot.n :]
-    found: list[Any] = trace_torque(joint_geometry(robot.model), robot.model.gravity, bodies[back], q, v, a)
+    found: list[Any] = trace_torque(
+        joint_geometry(robot.model), floats(robot.model.gravity.linear), bodies[back], q, v, a
+    )
     rows = [
         found[int(place)] + rotor * motion.a[j, 0]
         for j, (place, rotor) in enumerate(zip(robot.order, armature, strict=True))
@@ -220,21 +147,12 @@ def link_slopes(signals: Signals, joint: int) -> tuple[Array, Array, Array]:
         return rigid
 
     def made() -> tuple[Array, Array, Array]:
-        motion, state = signals.motion, (signals.motion.q, signals.motion.v, signals.motion.a)
-
-        def differentiated(k: int, step: float) -> Array:
-            up, down = [part.copy() for part in state], [part.copy() for part in state]
-            up[k][joint] += step
-            down[k][joint] -= step
-            return (on_links_at(signals, *up) - on_links_at(signals, *down)) / (2.0 * step)
-
-        by_q = rigid[0] + differentiated(0, POSITION_STEP)
-        if all(item.effect.of_position for item in signals.scene.link_torques):
-            return by_q, rigid[1], rigid[2]
-        by_v = rigid[1] + differentiated(1, SPEED_STEP * max(float(np.max(np.abs(motion.v))), 1.0))
-        pushed = motion.a.copy()
-        pushed[joint] += 1.0
-        return by_q, by_v, rigid[2] + on_links_at(signals, motion.q, motion.v, pushed) - signals.on_links
+        found = list(rigid)
+        for item in signals.scene.link_torques:
+            for k, slope in enumerate(item.effect.link_slopes(signals, item.member, np.array(item.value), joint)):
+                found[k] = found[k] + slope
+        by_q, by_v, by_a = found
+        return by_q, by_v, by_a
 
     return shared(signals, ("on links", joint), made)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -10,8 +11,9 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.effects.effect import DOUBT_STDS, Effect
-from scara_ident.effects.following import EstimateSlopes
-from scara_ident.effects.links import first_moments, gravity_columns, gravity_torque, shared, sideways
+from scara_ident.effects.following import EstimateSlopes, LinkSlopes
+from scara_ident.effects.gravity import first_moments, gravity_columns, gravity_size, gravity_torque, sideways
+from scara_ident.effects.links import shared
 from scara_ident.effects.parameters import Member, NonlinearParameter, Parameter, View
 from scara_ident.effects.signals import Scene, Signals
 from scara_ident.effects.spanned import rows_by_sample
@@ -107,35 +109,40 @@ def _parts(signals: Signals) -> Array:
     """
 
     def make() -> Array:
-        scene, motion = signals.scene, signals.motion
-        term = scene.model.rigid_body
-        gravity = _gravity(term)
-        known = gravity.known @ scene.value[scene.model.place(term)]
-        result = np.zeros((scene.robot.n, 4 + len(gravity.entering_axes), motion.samples), dtype=motion.q.dtype)
-        for axis in range(2):
-            entering = [place for place, of in enumerate(gravity.entering_axes) if of == axis]
-            moments = np.vstack([known, gravity.nominal, gravity.entering[:, entering].T])
-            places = [axis, 2 + axis, *(4 + place for place in entering)]
-            # In parts: the columns of all first moments at once would be the largest array of a diagnosis.
-            for start in range(0, motion.samples, AT_ONCE):
-                part = slice(start, start + AT_ONCE)
-                result[:, places, part] = gravity_torque(scene.robot, axis, motion.q[:, part], moments)
-        return result
+        scene, q = signals.scene, signals.motion.q
+        gravity = _gravity(scene.model.rigid_body)
+        known = _known_moments(scene)
+        against = [_against(scene.robot, axis) for axis in range(2)]
+        sets = [(axis, moments) for moments in (known, gravity.nominal) for axis in range(2)]
+        sets += [(axis, gravity.entering[:, k]) for k, axis in enumerate(gravity.entering_axes)]
+        torques = [gravity_torque(scene.robot, q, against[axis], moments) for axis, moments in sets]
+        return np.stack(torques, axis=1)
 
     return shared(signals, "tilt", make)
+
+
+def _known_moments(scene: Scene) -> Array:
+    """Return masses and first moments as the present estimate has them, each in the place that leads its base parameter, shape (4 n,)."""
+    term = scene.model.rigid_body
+    return np.asarray(_gravity(term).known @ scene.value[scene.model.place(term)])
+
+
+def _against(robot: Robot, axis: int) -> Array:
+    """Return gravity along minus one of the directions across it, base frame, m/s^2, shape (3,)."""
+    return np.asarray(-gravity_size(robot) * sideways(robot)[axis][1])
 
 
 def _known_slopes(signals: Signals, axes: Sequence[int], tilt: Array) -> EstimateSlopes:
     """Return the derivatives of the known parameters' torque under gravity against directions across it, by these parameters."""
     scene, motion = signals.scene, signals.motion
     term = scene.model.rigid_body
-    moments = _gravity(term).known
-    places = np.flatnonzero(np.any(moments != 0.0, axis=0))
+    # A base parameter stands for the one moment that leads it.
+    moments, places = np.nonzero(_gravity(term).known)
     result = np.zeros((scene.robot.n, len(places), motion.samples))
     for axis, size in zip(axes, tilt.tolist(), strict=True):
         for start in range(0, motion.samples, AT_ONCE):
             part = slice(start, start + AT_ONCE)
-            result[:, :, part] += size * gravity_torque(scene.robot, axis, motion.q[:, part], moments[:, places].T)
+            result[:, :, part] += size * gravity_columns(scene.robot, axis, motion.q[:, part])[:, moments]
     return {joint: (scene.model.place(term).start + places, rows) for joint, rows in enumerate(result)}
 
 
@@ -152,6 +159,24 @@ class _Tilt(Effect):
     watched = True
     view = View("position")
     experiment = "hold still, or move very slowly, at positions over more than half a turn: a tilt's torque follows the sine of the angle, a spring's the angle"
+
+    @abstractmethod
+    def pulls(self, scene: Scene, member: Member, value: Array) -> tuple[tuple[Array, Array], ...]:
+        """Return gravities, shape (3,), with the masses and first moments, shape (4 n,), whose torques together are those of coefficients (k,)."""
+
+    def torque_on_links(self, signals: Signals, member: Member, value: Array) -> Array:
+        """Return what `signal_columns` add up to, at once."""
+        return self._summed(signals, member, value)
+
+    def link_slopes(self, signals: Signals, member: Member, value: Array, joint: int) -> LinkSlopes:
+        """Return exact derivatives."""
+        return (self._summed(signals, member, value, joint),)
+
+    def _summed(self, signals: Signals, member: Member, value: Array, joint: int | None = None) -> Array:
+        scene, q, found = signals.scene, signals.motion.q, np.zeros_like(signals.motion.q)
+        for gravity, moments in self.pulls(scene, member, value):
+            found += gravity_torque(scene.robot, q, gravity, moments, joint)
+        return found
 
 
 class BaseTilt(_Tilt):
@@ -185,6 +210,16 @@ class BaseTilt(_Tilt):
         """Return the torques of known parameters under sideways gravity and those of new ones."""
         parts = np.moveaxis(_parts(signals), 1, 0)
         return [*parts[list(_gravity(signals.scene.model.rigid_body).known_axes)], *parts[4:]]
+
+    def pulls(self, scene: Scene, member: Member, value: Array) -> tuple[tuple[Array, Array], ...]:
+        """Return both directions, each with what is known times its tilt and what enters."""
+        gravity, known = _gravity(scene.model.rigid_body), _known_moments(scene)
+        moments = np.zeros((2, len(known)))
+        for tilt, axis in zip(value, gravity.known_axes, strict=False):
+            moments[axis] += tilt * known
+        for k, axis in enumerate(gravity.entering_axes, len(gravity.known_axes)):
+            moments[axis] += value[k] * gravity.entering[:, k - len(gravity.known_axes)]
+        return tuple((_against(scene.robot, axis), each) for axis, each in enumerate(moments) if np.any(each))
 
     def estimate_slopes(self, signals: Signals, member: Member, value: Array) -> EstimateSlopes:
         """Return those by the known first moments, which turn with gravity."""
@@ -239,10 +274,15 @@ class NominalBaseTilt(_Tilt):
 
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
         """Return the torque under sideways gravity."""
-        gravity = _gravity(signals.scene.model.rigid_body)
-        factor = member.nonlinear[0] if gravity.known_axes else 1.0
-        parts = np.moveaxis(_parts(signals), 1, 0)
+        factor, parts = self._factor(signals.scene, member), np.moveaxis(_parts(signals), 1, 0)
         return [parts[axis] + factor * parts[2 + axis] for axis in self._axes(signals.scene)]
+
+    def pulls(self, scene: Scene, member: Member, value: Array) -> tuple[tuple[Array, Array], ...]:
+        """Return both directions at once: they pull at the same bodies."""
+        axes = zip(value, self._axes(scene), strict=True)
+        sideward = sum((tilt * _against(scene.robot, axis) for tilt, axis in axes), np.zeros(3))
+        nominal = _gravity(scene.model.rigid_body).nominal
+        return ((sideward, _known_moments(scene) + self._factor(scene, member) * nominal),)
 
     def estimate_slopes(self, signals: Signals, member: Member, value: Array) -> EstimateSlopes:
         """Return those by the known first moments, which turn with gravity."""
@@ -251,6 +291,9 @@ class NominalBaseTilt(_Tilt):
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """The base is nearly level."""
         return _too_steep(value, std)
+
+    def _factor(self, scene: Scene, member: Member) -> float:
+        return member.nonlinear[0] if _gravity(scene.model.rigid_body).known_axes else 1.0
 
     def _axes(self, scene: Scene) -> list[int]:
         gravity = _gravity(scene.model.rigid_body)

@@ -9,7 +9,8 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.effects.effect import Effect
-from scara_ident.effects.links import first_moments, pinocchio_columns, tool_of
+from scara_ident.effects.gravity import first_moments, pinocchio_columns
+from scara_ident.effects.links import tool_of
 from scara_ident.effects.parameters import Coefficient, Member
 from scara_ident.effects.signals import Scene, Signals
 from scara_ident.model.regressor.kernel import RegressorKernel, build_kernel

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from scara_ident.arrays import Array
 from scara_ident.effects import EffectTerm, Scene, Signals
@@ -15,6 +14,7 @@ from scara_ident.model.model import TorqueModel
 from scara_ident.model.regressor.recursion import joint_geometry
 from scara_ident.model.regressor.torque import trace_torque
 from scara_ident.model.regressor.tracing import Expr, Scalar, Trace
+from scara_ident.model.regressor.vectors import ZERO, Vector, floats
 from scara_ident.model.terms import RigidBody, Term
 from scara_ident.motion.motion import Motion
 from scara_ident.robot.robot import Robot
@@ -61,10 +61,9 @@ def trace_model(model: TorqueModel, value: Array) -> TracedModel:
     trace = Trace()
     q, v, a = (traced([trace.variable(k + part * n) for k in range(n)]) for part in range(3))
     zero = traced(np.zeros(n).tolist())
-    still = pin.Motion.Zero()
     rigid, own = model.rigid_body, value[model.place(model.rigid_body)]
-    unit = np.eye(n)
-    columns = [_rigid(rigid, own, q, zero, traced(unit[k].tolist()), still) for k in range(n)]
+    unit, gravity = np.eye(n), floats(robot.model.gravity.linear)
+    columns = [_rigid(rigid, own, q, zero, traced(unit[k].tolist()), ZERO) for k in range(n)]
     motion = Motion("", "", np.zeros(1), q[:, None], v[:, None], a[:, None], None, np.inf)
     rest: Array = traced(np.zeros(n).tolist())
     signals: dict[int, Signals] = {}
@@ -84,9 +83,9 @@ def trace_model(model: TorqueModel, value: Array) -> TracedModel:
     return TracedModel(
         robot,
         trace,
-        tuple(_rigid(rigid, own, q, v, a, robot.model.gravity) + rest),
+        tuple(_rigid(rigid, own, q, v, a, gravity) + rest),
         _symmetric(robot, columns),
-        tuple(_rigid(rigid, own, q, v, zero, robot.model.gravity)),
+        tuple(_rigid(rigid, own, q, v, zero, gravity)),
         tuple(rest),
     )
 
@@ -102,7 +101,7 @@ def _symmetric(robot: Robot, columns: Sequence[Array]) -> tuple[tuple[Scalar, ..
     return tuple(tuple(entry(j, k) for k in range(robot.n)) for j in range(robot.n))
 
 
-def _rigid(term: RigidBody, value: Array, q: Array, v: Array, a: Array, gravity: pin.Motion) -> Array:
+def _rigid(term: RigidBody, value: Array, q: Array, v: Array, a: Array, gravity: Vector) -> Array:
     """Return the torque of links and rotors, recorded side, shape (n,)."""
     robot: Robot = term.robot
     n, standard = robot.n, term.standard(value)
@@ -119,7 +118,7 @@ def _signals(scene: Scene, motion: Motion) -> Signals:
     rigid = scene.model.rigid_body
     own = scene.value[scene.model.place(rigid)]
     q, v, a = (part[:, 0] for part in (motion.q, motion.v, motion.a))
-    torque = _rigid(rigid, own, q, v, a, scene.robot.model.gravity)
+    torque = _rigid(rigid, own, q, v, a, floats(scene.robot.model.gravity.linear))
     others = (
         _torque(term, scene.value[scene.model.place(term)], motion) for term in scene.model.terms if term is not rigid
     )

@@ -5,13 +5,13 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-import pinocchio as pin
 
 from scara_ident.arrays import Array
 from scara_ident.model.regressor.program import Program
 from scara_ident.model.regressor.recursion import joint_geometry
 from scara_ident.model.regressor.torque import trace_torque
 from scara_ident.model.regressor.tracing import Trace, compile_program
+from scara_ident.model.regressor.vectors import ZERO, floats
 from scara_ident.motion.motion import Motion
 from scara_ident.robot.robot import Robot
 
@@ -51,8 +51,8 @@ def _program(robot: Robot) -> Program:
     # The parameters stand in the order of the description, the bodies in Pinocchio's.
     bodies = robot.standard_parameters()[: 10 * robot.n].reshape(-1, 10)[back]
     joints, still = joint_geometry(robot.model), [0.0] * robot.n
-    torques = [trace_torque(joints, pin.Motion.Zero(), bodies, q, v, a)]
-    torques += [trace_torque(joints, pin.Motion(axis, np.zeros(3)), bodies, q, still, still) for axis in np.eye(3)]
+    torques = [trace_torque(joints, ZERO, bodies, q, v, a)]
+    torques += [trace_torque(joints, floats(axis), bodies, q, still, still) for axis in np.eye(3)]
     outputs = [
         (kind * robot.n + joint, torque[int(j)])
         for kind, torque in enumerate(torques)

@@ -11,9 +11,8 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from scara_ident.effects import CATALOGUE, Effect, Member, Signals
+from scara_ident.effects.gravity import first_moments, gravity_columns
 from scara_ident.effects.links import (
-    first_moments,
-    gravity_columns,
     guessed_armatures,
     lagging,
     lagging_at,
@@ -25,7 +24,6 @@ from scara_ident.effects.links import (
     rigid_slopes,
     rigid_torque,
     shared,
-    sideways,
     tool_of,
     usual_link_inertia,
 )
@@ -74,35 +72,6 @@ def test_inertia_of_the_link_is_the_mass_matrix_without_the_rotor():
     expected = [pin.crba(robot.model, data, item.q[:, k])[0, 0] for k in range(item.samples)]
     assert link_inertia(Signals(scene, item), 0) == pytest.approx(expected)
     assert 2.0 < usual_link_inertia(scene, 0) < 4.0
-
-
-def test_gravity_from_the_side_is_that_of_pinocchio(tmp_path):
-    robot = load_robot(example_urdf("ur5_robot.urdf"))
-    item = moving(robot, 0.02)
-    rest = np.zeros_like(item.q)
-    moments = robot.standard_parameters()[first_moments(robot)]
-    for axis in range(2):
-        found = np.einsum("jkn,k->jn", gravity_columns(robot, axis, item.q), moments)
-        tilted = load_robot(example_urdf("ur5_robot.urdf"))
-        tilted.model.gravity.linear = -9.81 * np.eye(3)[axis]
-        expected = rnea(tilted, item.q, rest, rest) * robot.row_scale[:, None]
-        assert found == pytest.approx(expected, abs=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("gravity", "names"),
-    [((0, 0, -1), "xy"), ((0, -1, 0), "xz"), ((1, 0, 0), "yz"), ((0, 0, 0), "xy"), ((0.0, -0.42, -0.91), "xy")],
-)
-def test_directions_across_gravity_are_named_by_the_nearest_axes(gravity, names):
-    robot = load_robot()
-    model = robot.model.copy()
-    model.gravity.linear = 9.81 * np.array(gravity, dtype=float)
-    found = sideways(replace(robot, model=model))
-    assert "".join(name for name, _ in found) == names
-    across = np.array([direction for _, direction in found])
-    assert across @ across.T == pytest.approx(np.eye(2))
-    assert across @ np.array(gravity) == pytest.approx(np.zeros(2))
-    assert all(direction["xyz".index(name)] > 0.9 for name, direction in found)
 
 
 def test_a_point_mass_has_the_parameters_of_pinocchio():

@@ -9,8 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import pinocchio as pin
-
 from scara_ident.arrays import Array
 from scara_ident.model.regressor.recursion import Body, JointGeometry, moved, turn_matrix
 from scara_ident.model.regressor.tracing import Expr, Scalar
@@ -19,7 +17,7 @@ from scara_ident.model.regressor.vectors import ZERO, Vector, cross, dot, floats
 
 def trace_torque(
     joints: Sequence[JointGeometry],
-    gravity: pin.Motion,
+    gravity: Vector,
     parameters: Sequence[Sequence[Scalar]] | Array,
     q: Sequence[Scalar],
     v: Sequence[Scalar],
@@ -31,8 +29,8 @@ def trace_torque(
     ----------
     joints : sequence of JointGeometry
         Joints 1.. in Pinocchio's order (a parent before its children).
-    gravity : pin.Motion
-        Spatial acceleration of gravity in the base frame.
+    gravity : tuple of Expr or float
+        Acceleration of gravity in the base frame, m/s^2.
     parameters : sequence of (bodies, 10) numbers or Expr
         Standard parameters, inertias about the origin of the joint's frame; they need not be those of a possible body.
     q, v, a : sequence of Expr or float, one per joint
@@ -43,7 +41,7 @@ def trace_torque(
     list of Expr or float
         N m or N, by velocity index.
     """
-    bodies = [Body(ZERO, floats(-gravity.angular), floats(-gravity.linear), {})]
+    bodies = [Body(ZERO, ZERO, scaled(gravity, -1.0), {})]
     for joint in joints:
         k = joint.velocity_index
         parent = bodies[joint.parent]

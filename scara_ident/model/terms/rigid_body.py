@@ -19,6 +19,7 @@ from scara_ident.model.regressor.program import Program
 from scara_ident.model.regressor.recursion import joint_geometry
 from scara_ident.model.regressor.torque import trace_torque
 from scara_ident.model.regressor.tracing import Expr, Scalar, Trace, compile_program
+from scara_ident.model.regressor.vectors import floats
 from scara_ident.model.terms.constraints import Constraint, RealBodies
 from scara_ident.model.terms.term import Column, Filled, StateTorque
 from scara_ident.motion.motion import Motion
@@ -128,7 +129,7 @@ class RigidBody(Filled):
         used = self._standard(np.ones(len(self.kept)))[0] != 0.0
         bodies = [trace.variable(3 * robot.n + k) if one else 0.0 for k, one in enumerate(used.tolist())]
         rows = [bodies[k : k + 10] for k in range(0, len(bodies), 10)]
-        torque = trace_torque(joint_geometry(robot.model), robot.model.gravity, rows, q, v, a)
+        torque = trace_torque(joint_geometry(robot.model), floats(robot.model.gravity.linear), rows, q, v, a)
         return trace, states, [torque[int(place)] for place in robot.order]
 
     @cached_property

@@ -9,7 +9,8 @@ from typing import ClassVar
 import numpy as np
 
 from scara_ident.arrays import Array
-from scara_ident.effects.links import gravity_size, point_mass
+from scara_ident.effects.gravity import gravity_size
+from scara_ident.effects.links import point_mass
 from scara_ident.errors import UsageError
 from scara_ident.simulation.arm import VirtualArm
 from scara_ident.simulation.effects.effect import BY_ARM, Effect, Vector, vacant

@@ -12,6 +12,7 @@ from scara_ident.model.base_parameters import standard_regressor
 from scara_ident.model.regressor.recursion import joint_geometry
 from scara_ident.model.regressor.torque import trace_torque
 from scara_ident.model.regressor.tracing import Trace, compile_program
+from scara_ident.model.regressor.vectors import floats
 from scara_ident.robot.robot import Robot
 from tests.export.arms import ARMS, random_motion, random_standard
 
@@ -24,7 +25,7 @@ def test_torques_are_those_of_the_regressor(make: Callable[[Path], Robot], tmp_p
     trace, back = Trace(), np.argsort(robot.order)
     q, v, a = ([trace.variable(k + part * n) for k in range(n)] for part in range(3))
     bodies = standard[: 10 * n].reshape(n, 10)[back]
-    torque = trace_torque(joint_geometry(robot.model), robot.model.gravity, bodies, q, v, a)
+    torque = trace_torque(joint_geometry(robot.model), floats(robot.model.gravity.linear), bodies, q, v, a)
     program = compile_program(trace, list(enumerate(torque)))
     motion = random_motion(robot, 3)
     out = np.zeros((n, motion[0].shape[1]))
@@ -40,7 +41,7 @@ def test_what_is_multiplied_by_zero_is_not_traced(tmp_path: Path) -> None:
     bodies[-1, 9] = 0.5
     trace = Trace()
     q, a = ([trace.variable(k + part * n) for k in range(n)] for part in (0, 2))
-    torque = trace_torque(joints, robot.model.gravity, bodies, q, zero, a)
+    torque = trace_torque(joints, floats(robot.model.gravity.linear), bodies, q, zero, a)
     program = compile_program(trace, list(enumerate(torque)))
     assert program.operations <= 3
-    assert trace_torque(joints, robot.model.gravity, np.zeros((n, 10)), q, zero, a) == zero
+    assert trace_torque(joints, floats(robot.model.gravity.linear), np.zeros((n, 10)), q, zero, a) == zero
