@@ -38,6 +38,7 @@ def first_moments(robot: Robot) -> NDArray[np.intp]:
     return np.asarray((10 * np.arange(robot.n)[:, None] + np.arange(4)).ravel(), dtype=np.intp)
 
 
+@lru_cache(maxsize=8)
 def sideways(robot: Robot) -> tuple[tuple[str, Array], tuple[str, Array]]:
     """Return the two directions across gravity, which are those that a base turns it in, and the base's axis nearest each.
 

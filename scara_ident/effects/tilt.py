@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -102,23 +102,34 @@ def _gravity(term: RigidBody) -> _Gravity:
     )
 
 
-def _parts(signals: Signals) -> Array:
-    """Torques under gravity against either direction across it, of what the estimate knows and of the rest, then of what enters.
+def _known_torque(signals: Signals, axis: int) -> Array:
+    """Return the torque of what the estimate knows under gravity against a direction across it, shape (n, N)."""
+    scene = signals.scene
+    return shared(
+        signals,
+        ("tilt", axis),
+        lambda: gravity_torque(scene.robot, signals.motion.q, _against(scene.robot, axis), _known_moments(scene)),
+    )
 
-    Shape (n, 4 + r, N): known of both, nominal of both, entering.
-    """
 
-    def make() -> Array:
-        scene, q = signals.scene, signals.motion.q
-        gravity = _gravity(scene.model.rigid_body)
-        known = _known_moments(scene)
-        against = [_against(scene.robot, axis) for axis in range(2)]
-        sets = [(axis, moments) for moments in (known, gravity.nominal) for axis in range(2)]
-        sets += [(axis, gravity.entering[:, k]) for k, axis in enumerate(gravity.entering_axes)]
-        torques = [gravity_torque(scene.robot, q, against[axis], moments) for axis, moments in sets]
-        return np.stack(torques, axis=1)
+def _nominal_torque(signals: Signals, axis: int) -> Array:
+    """Return the same of what the base parameters leave out, with the URDF's masses and first moments."""
+    gravity = _gravity(signals.scene.model.rigid_body)
+    return _of_motion(signals, ("nominal", gravity, axis), axis, gravity.nominal)
 
-    return shared(signals, "tilt", make)
+
+def _entering_torques(signals: Signals) -> list[Array]:
+    """Return the torque of each combination of first moments that enters."""
+    gravity = _gravity(signals.scene.model.rigid_body)
+    return [
+        _of_motion(signals, ("entering", gravity, k), axis, gravity.entering[:, k])
+        for k, axis in enumerate(gravity.entering_axes)
+    ]
+
+
+def _of_motion(signals: Signals, key: Hashable, axis: int, moments: Array) -> Array:
+    robot, q = signals.scene.robot, signals.motion.q
+    return shared(signals.motion, key, lambda: gravity_torque(robot, q, _against(robot, axis), moments))
 
 
 def _known_moments(scene: Scene) -> Array:
@@ -208,8 +219,8 @@ class BaseTilt(_Tilt):
 
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
         """Return the torques of known parameters under sideways gravity and those of new ones."""
-        parts = np.moveaxis(_parts(signals), 1, 0)
-        return [*parts[list(_gravity(signals.scene.model.rigid_body).known_axes)], *parts[4:]]
+        axes = _gravity(signals.scene.model.rigid_body).known_axes
+        return [*(_known_torque(signals, axis) for axis in axes), *_entering_torques(signals)]
 
     def pulls(self, scene: Scene, member: Member, value: Array) -> tuple[tuple[Array, Array], ...]:
         """Return both directions, each with what is known times its tilt and what enters."""
@@ -274,8 +285,8 @@ class NominalBaseTilt(_Tilt):
 
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
         """Return the torque under sideways gravity."""
-        factor, parts = self._factor(signals.scene, member), np.moveaxis(_parts(signals), 1, 0)
-        return [parts[axis] + factor * parts[2 + axis] for axis in self._axes(signals.scene)]
+        factor, axes = self._factor(signals.scene, member), self._axes(signals.scene)
+        return [_known_torque(signals, axis) + factor * _nominal_torque(signals, axis) for axis in axes]
 
     def pulls(self, scene: Scene, member: Member, value: Array) -> tuple[tuple[Array, Array], ...]:
         """Return both directions at once: they pull at the same bodies."""
