@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -125,9 +125,20 @@ def about_lines(found: IdentifiedModel, said: Said) -> tuple[str, ...]:
         f"{name}: rms error {kind} {_number(own[name])} {found.robot.torque_unit(j)}, of the model {_number(model[name])}."
         for j, name in enumerate(found.robot.joints)
     ]
-    lines += [f"{note[0].upper()}{note[1:]}." for note in _open(found)]
+    lines += [*_speeds(found), *(f"{note[0].upper()}{note[1:]}." for note in _open(found))]
     missing = (f"Not exported: {what}: {why}." for what, why in said.missing)
     return (*lines, *missing, *convention_lines(found.robot))
+
+
+def _speeds(found: IdentifiedModel) -> Iterator[str]:
+    """Say up to which speeds the model was fitted."""
+    if found.reached is not None:
+        robot = found.robot
+        each = (
+            f"{joint} {v:.3g} {robot.position_unit(j)}/s"
+            for j, (joint, v) in enumerate(zip(robot.joints, found.reached.speed, strict=True))
+        )
+        yield f"Fitted up to these speeds, beyond which friction is extrapolated: {', '.join(each)}."
 
 
 def _open(found: IdentifiedModel) -> tuple[str, ...]:

@@ -20,6 +20,7 @@ from scara_ident.identification.identify import Identification
 from scara_ident.model.model import TorqueModel
 from scara_ident.model.terms import Friction
 from scara_ident.motion.motion import Motion
+from scara_ident.motion.recorded_range import RecordedRange, recorded_range
 from scara_ident.robot.robot import Robot
 
 # An effect as ``diagnosis.json`` has it: ``effect``, ``joint``, ``parameters`` with ``value`` and ``std``, and ``held_out``.
@@ -56,6 +57,8 @@ class IdentifiedModel:
         known.
     found : tuple of Entry
         The effects found.
+    reached : RecordedRange or None
+        Of the recordings that it was fitted to; None where it is not known.
     """
 
     model: TorqueModel
@@ -71,6 +74,7 @@ class IdentifiedModel:
     bands: tuple[float | None, ...]
     rms: Array
     found: tuple[Entry, ...] = ()
+    reached: RecordedRange | None = None
 
     @property
     def robot(self) -> Robot:
@@ -200,6 +204,7 @@ def identified_model(found: Identification | Diagnosis) -> IdentifiedModel:
         bands=tuple(bands),
         rms=np.array([np.nan if error is None else error.rms_unfiltered for error in errors]),
         found=entries,
+        reached=recorded_range(fitted.data),
     )
 
 

@@ -26,6 +26,7 @@ from scara_ident.files import path_fault, unreadable
 from scara_ident.memory import read_text
 from scara_ident.model import MODELS
 from scara_ident.model.model import TorqueModel, build_model
+from scara_ident.motion.recorded_range import range_of_entry
 from scara_ident.robot.description import check_description
 from scara_ident.robot.robot import Robot, build_robot, load_robot
 from scara_ident.robot.signal_map import recording_entry
@@ -124,6 +125,8 @@ def _model_of(
         bands=tuple(bands.get(joint) for joint in arm.joints),
         rms=_rms(content, arm.joints),
         found=tuple(content.get("effects", ())),
+        # Results of earlier versions have none.
+        reached=range_of_entry(content["range"], arm) if "range" in content else None,
     )
 
 

@@ -21,6 +21,7 @@ from scara_ident.inquiry.next_steps import next_steps
 from scara_ident.inquiry.questions import suspects_in_model
 from scara_ident.inquiry.torque_noise import noise_density
 from scara_ident.model.urdf_values import urdf_values
+from scara_ident.motion.recorded_range import recorded_range
 from scara_ident.report.diagnosis_words import headline_and_details
 from scara_ident.report.identification import bias_of
 from scara_ident.report.left_out import left_out_share
@@ -96,6 +97,7 @@ def diagnosis_dict(diagnosis: Diagnosis, worth: Mapping[str, Any] | None = None)
         "rotors": [_rotor(rotor, diagnosis) for rotor in diagnosis.rotors],
         "training": _before_after(diagnosis, diagnosis.training_before, diagnosis.training_after),
         "validation": _before_after(diagnosis, diagnosis.validation_before, diagnosis.validation_after),
+        "range": recorded_range(diagnosis.training_after.data).entry(robot),
         "left_out": {
             "training": left_out_share(diagnosis.training_after),
             "validation": left_out_share(diagnosis.validation_after),

@@ -31,6 +31,7 @@ from scara_ident.identification.identify import (
 from scara_ident.manners import listed
 from scara_ident.model.terms.friction import Friction
 from scara_ident.model.urdf_values import urdf_values
+from scara_ident.motion.recorded_range import faster_than_recorded, recorded_range
 from scara_ident.report.doubts import doubts
 from scara_ident.robot.robot import Robot
 
@@ -75,6 +76,7 @@ def identification_dict(identification: Identification) -> dict[str, Any]:
         "contradictions": list(possible.reasons),
         "distance_to_possible_std": possible.distance_std,
         "band_hz": robot.by_joint(identification.bands),
+        "range": recorded_range(identification.training.data).entry(robot),
         "errors": {
             "training": _errors(robot, identification.training_errors()),
             "validation": _errors(robot, identification.validation_errors()),
@@ -147,6 +149,10 @@ def _others(identification: Identification) -> list[str]:
         found.append(
             f"The largest held-out error is on {recording}, {joint}: {rms:.3g} {unit} rms{beside}, {share:.1%} of the torque."
         )
+        held_out = recorded_range(identification.validation.data)
+        known = recorded_range(identification.training.data)
+        faster = faster_than_recorded(known, held_out.speed, robot, "The held-out recordings are")
+        found += [faster] if faster else []
     else:
         found.append(
             "There are no held-out recordings: give --validate recordings to measure how well the model predicts."

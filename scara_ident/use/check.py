@@ -16,6 +16,7 @@ from scara_ident.export.identified_model import IdentifiedModel
 from scara_ident.manners import listed
 from scara_ident.motion.motion import Motion
 from scara_ident.motion.prepared import prepare
+from scara_ident.motion.recorded_range import faster_than_recorded
 from scara_ident.recording.files import column_names
 from scara_ident.recording.recording import read_recording
 from scara_ident.simulation.reference import read_trajectory
@@ -302,6 +303,9 @@ def sentences(found: Check) -> list[str]:
         said.append(
             f"The largest torque is uncertain by more than a tenth (two standard deviations) on {listed(unsure, MAX_NAMED)}."
         )
+    speed = np.max([np.max(np.abs(each.motion.v), axis=1) for each in found.drives], axis=0)
+    if faster := faster_than_recorded(found.known.reached, speed, found.known.robot):
+        said.append(faster)
     said.append(
         f"The drives give {energy.given.sum():.4g} J and take {energy.returned.sum():.4g} J back; "
         f"{energy.heated.sum():.4g} J become heat in the joints."

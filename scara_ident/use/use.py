@@ -13,6 +13,7 @@ from scara_ident.errors import LostArm, RecordingError, RobotError, ScaraIdentEr
 from scara_ident.export.identified_model import Entry, IdentifiedModel
 from scara_ident.manners import listed
 from scara_ident.motion.prepared import PreparedStretch, prepare
+from scara_ident.motion.recorded_range import faster_than_recorded
 from scara_ident.progress import Tell, silent
 from scara_ident.recording.recording import Recording
 from scara_ident.simulation.arm import VirtualArm
@@ -57,7 +58,7 @@ class Use:
     feeds : mapping of str to ndarray of shape (n, N)
         Torque fed forward, on the effort side; none for ``pid``.
     notes : tuple of str
-        What of the model no virtual arm can have.
+        What of the model no virtual arm can have, and where its motion is faster than what it was found on.
     """
 
     model: IdentifiedModel
@@ -188,7 +189,8 @@ def use(
                     rollouts[name] = _over(parts, free)
             except ScaraIdentError as error:
                 not_mujoco = str(error)
-    notes = tuple(filter(None, [rotor_note(model)]))
+    speed = np.max(np.abs(wanted.velocity), axis=1)
+    notes = tuple(filter(None, [rotor_note(model), faster_than_recorded(model.reached, speed, model.robot)]))
     return Use(model, wanted, tuple(runs), HORIZONS, rollouts, not_mujoco, effects, missing, tuple(drawn), feeds, notes)
 
 

@@ -13,6 +13,7 @@ from scara_ident.errors import ScaraIdentError
 from scara_ident.export import exported
 from scara_ident.export.exported import export_model, write_exported
 from scara_ident.export.forms import FORMS
+from scara_ident.motion.recorded_range import RecordedRange
 from tests.export.identified import NOISE, model_torque, states
 
 pytestmark = pytest.mark.slow
@@ -53,6 +54,15 @@ def test_what_the_recordings_leave_open_is_said_beside_and_in_the_file(models, t
     assert f"the {said}" in done.notes
     code = [text for name, text in done.files.items() if name.endswith((".h", ".py", ".yaml"))]
     assert all(f"The {said}." in text for text in code)
+
+
+@pytest.mark.parametrize("to", ["c", "casadi"])
+def test_how_fast_the_recordings_were_is_said_in_the_file(models, to):
+    reached = RecordedRange(np.zeros(2), np.zeros(2), np.array([1.25, 0.5]), np.zeros(2))
+    known = replace(models["scara", False], reached=reached)
+    for model, count in ((known, 1), (replace(known, reached=None), 0)):
+        (text,) = export_model(model, to).files.values()
+        assert text.count("friction is extrapolated: joint1 1.25 rad/s, joint2 0.5 rad/s.") == count
 
 
 @pytest.mark.parametrize("to", ["c", "mjcf"])

@@ -54,6 +54,10 @@ def test_an_identification_reads_back_with_its_errors(found, content, read):
     assert (back.bands, back.found, back.undetermined.tolist()) == (own.bands, (), own.undetermined.tolist())
     for name in ("value", "std", "covariance", "before", "rms", "standard"):
         np.testing.assert_allclose(getattr(back, name), getattr(own, name), rtol=1e-9)
+    for name in ("lower", "upper", "speed", "acceleration"):
+        np.testing.assert_array_equal(getattr(back.reached, name), getattr(own.reached, name))
+    earlier = {key: value for key, value in content.items() if key != "range"}
+    assert read(earlier).reached is None
     assert back.errors(back.value) == pytest.approx(own.errors(own.value), rel=1e-9)
     assert back.held_out[0] == "validation"
     for joint, error in back.errors(back.value).items():

@@ -251,3 +251,13 @@ def test_what_cannot_be_negative_is_said_to_be_so_by_chance_or_not(result, stds:
     assert found is not None and said in found and f"a01 by {-stds:.2g} standard deviations" in found
     changed = replace(result, estimate=replace(estimate, value=value))
     assert found in sentences(changed)
+
+
+def test_held_out_recordings_that_are_faster_are_said_to_be() -> None:
+    slow, fast = run("OJD_1", 1), run("CI_1", 3, start=4.0)
+    slower = replace(slow, time=2.0 * slow.time)
+    for fitted, count in ((run("CI_2", 4, start=4.0), 0), (slower, 1)):
+        said = [
+            line for line in sentences(made([fitted], [fast])) if line.startswith("The held-out recordings are faster")
+        ]
+        assert len(said) == count

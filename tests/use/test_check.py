@@ -12,6 +12,7 @@ from scara_ident.export.identified_model import IdentifiedModel, identified_mode
 from scara_ident.identification.identify import identify
 from scara_ident.model.model import build_model
 from scara_ident.motion.motion import Motion
+from scara_ident.motion.recorded_range import RecordedRange
 from scara_ident.recording.recording import write_recording
 from scara_ident.robot.robot import load_robot
 from scara_ident.simulation import ideal, simulate, virtual_arm
@@ -112,6 +113,21 @@ def test_the_limiting_joint_and_time_are_named(rehearsed):
     motions = [slowed(each.motion, share) for each in found.drives]
     assert not check(known, motions, limits).broken
     assert check(known, [slowed(each.motion, 1.1 * share) for each in found.drives], limits).broken
+
+
+def test_a_motion_faster_than_the_recordings_says_so(rehearsed):
+    known, _, path = rehearsed
+    (motion,) = read_motion(path, known)
+    speed = np.max(np.abs(motion.v), axis=1)
+    reached = RecordedRange(np.zeros(2), np.zeros(2), speed * [1.0, 0.5], np.zeros(2))
+    for each, count in ((replace(known, reached=reached), 1), (replace(known, reached=None), 0)):
+        said = [
+            line
+            for line in check_dict(check(each, [motion], joint_limits(known.robot)))["summary"]
+            if "faster than" in line
+        ]
+        assert len(said) == count
+        assert all("joint2" in line and "joint1" not in line for line in said)
 
 
 def test_what_is_beyond_a_position_limit_cannot_be_run_slower_either(known: IdentifiedModel):

@@ -12,6 +12,7 @@ import pytest
 from scara_ident.errors import LostArm, ScaraIdentError, UsageError
 from scara_ident.estimation.information import Information
 from scara_ident.model.model import TorqueModel
+from scara_ident.motion.recorded_range import RecordedRange
 from scara_ident.simulation import parse_effect, simulate, virtual_arm
 from scara_ident.simulation.arm import VirtualArm
 from scara_ident.use import tracking, use
@@ -47,7 +48,9 @@ def test_an_arm_that_is_lost_is_drawn_nearer(monkeypatch: pytest.MonkeyPatch) ->
 
     monkeypatch.setattr(import_module("scara_ident.use.use"), "tracked", fickle)
     model = with_spring()
-    found = use(replace(model, found=()), swing(model.robot, 0.5), arms=1)
+    slow = RecordedRange(np.zeros(2), np.zeros(2), np.array([1e-3, 9.0]), np.zeros(2))
+    found = use(replace(model, found=(), reached=slow), swing(model.robot, 0.5), arms=1)
+    assert [("joint1" in line, "joint2" in line) for line in found.notes if "faster than" in line] == [(True, False)]
     (arm, _), middle = found.drawn[0], float(arms_of(model)[1].bodies[0, 9])
     assert arm.bodies[0, 9] == tried[2]
     np.testing.assert_allclose(tried[2] - middle, [0.25 * (tried[0] - middle), 0.5 * (tried[1] - middle)], rtol=1e-6)
