@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.inspection.chain import is_still, with_locked
+from scara_ident.inspection.efforts import is_computed, is_torque, why_taken
 from scara_ident.inspection.names import CURRENT, JOINT_STATES, LINK_SIDE, TORQUE, Meaning, nameless
 from scara_ident.inspection.second_encoder import second_encoder
 from scara_ident.inspection.signals import Signal, groups, of_group, of_other_kind, short_together
@@ -176,6 +177,7 @@ def _find_signal(
         moving = sum(not is_still(numbers[column]) for column in signal.columns.values())
         rank = (
             said.commanded,
+            is_computed(said),
             any(
                 of_other_kind(meanings[column], quantity, bool(robot.prismatic[k]))
                 for k, column in signal.columns.items()
@@ -185,7 +187,7 @@ def _find_signal(
             bool(said.words & LINK_SIDE),
             not by_name,
             not said.measured,
-            not said.words & TORQUE,
+            not is_torque(said),
             # Channels of one source begin alike.
             -sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], zip(template, beside, strict=False))),
             order,
@@ -199,14 +201,17 @@ def _find_signal(
     if note:
         result.notes.append(note)
     taken = set(best.columns.values())
-    others = [signal.pattern for _, signal, _ in found[1:] if not taken & set(signal.columns.values())]
+    others = [signal for _, signal, _ in found[1:] if not taken & set(signal.columns.values())]
     if others:
-        result.notes.append(f"{quantity}: {best.pattern} taken, not {', '.join(others[:3])}")
+        said_of = [] if quantity != "effort" else [why_taken(best, other, meanings, numbers) for other in others]
+        why = "".join(f": {reason}" for reason in list(filter(None, said_of))[:1])
+        result.notes.append(f"{quantity}: {best.pattern} taken, not {', '.join(s.pattern for s in others[:3])}{why}")
     still = [robot.joints[k] for k, column in best.columns.items() if is_still(numbers[column])]
     if 0 < len(still) < len(best.columns):
         result.notes.append(f"{quantity}: constant for {', '.join(still)}; check its columns")
-    if first[0]:
-        result.notes.append(f"{quantity}: {best.pattern} seems to be a command, not a measurement, by its name")
+    if first[0] or first[1]:
+        kind = "a command" if first[0] else "computed"
+        result.notes.append(f"{quantity}: {best.pattern} seems to be {kind}, not a measurement, by its name")
     return best
 
 

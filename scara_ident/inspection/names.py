@@ -46,6 +46,11 @@ MEASURED = frozenset(
     ["actual", "act", "measured", "meas", "feedback", "fb", "sensor", "ist", "akt", "aktuell", "gemessen", "mesure",
      "mesuree", "reel"]
 )  # fmt: skip
+# Of an effort that was computed from a model of the arm; an estimate may as well be of a current.
+COMPUTED = frozenset(
+    ["model", "modelled", "modeled", "computed", "calculated", "calc", "predicted", "ff", "feedforward", "theoretical",
+     "modell", "berechnet", "vorsteuerung", "modele", "calcule", "theorique"]
+)  # fmt: skip
 # Of such columns no channel of a joint is made.
 OTHER = frozenset(
     ["error", "err", "std", "min", "max", "limit", "limits", "tcp", "tool", "cartesian", "pose", "gripper", "imu",
