@@ -162,7 +162,8 @@ def _others(identification: Identification) -> list[str]:
             f"The data do not determine {listed(open_, MAX_NAMED)}; record a motion that excites "
             f"{'it' if len(open_) == 1 else 'them'}."
         )
-    elif not in_sums:
+    small = insignificant_parameters(identification)
+    if not open_ and not in_sums and not small:
         found.append("Every parameter is determined.")
     possible = identification.physical_consistency
     if possible.possible:
@@ -177,10 +178,14 @@ def _others(identification: Identification) -> list[str]:
         below = below_zero_said(identification.estimate, identification.training)
         if below is not None:
             found.append(below)
-    small = insignificant_parameters(identification)
-    if small:
-        found.append(f"Within two standard deviations of zero: {listed(small, MAX_NAMED)}.")
     unsure = of_unknown_std(identification)
+    if small:
+        every = len(identification.model.names)
+        known = every - len(open_) - len(unsure)
+        found.append(
+            f"{known - len(small)} of {known}{' determined' * (known < every)} parameters differ from zero by more than two standard "
+            f"deviations; not {listed(small, MAX_NAMED)}."
+        )
     if unsure:
         found.append(
             f"The standard deviation of {listed(unsure, MAX_NAMED)} is not known: almost all information about "
