@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from scara_ident.calling import asked_for
 from scara_ident.estimation import Estimate, JointError
 from scara_ident.estimation.consistent.estimator import ConsistentEstimate, links
 from scara_ident.estimation.consistent.shape import ShapeChoice
@@ -149,7 +150,7 @@ def _others(identification: Identification) -> list[str]:
         )
     else:
         found.append(
-            "There are no held-out recordings: give --validate recordings to measure how well the model predicts."
+            f"There are no held-out recordings: give {asked_for('--validate', 'validation')} recordings to measure how well the model predicts."
         )
     open_, in_sums = undetermined(identification), determined_in_sums(identification)
     if in_sums:
@@ -173,7 +174,7 @@ def _others(identification: Identification) -> list[str]:
         found.append(f"{why[0].upper()}{why[1:]}.")
     else:
         found.append(
-            f"The parameters are not physically consistent: {'; '.join(possible.reasons)}. Use --method consistent for parameters that are."
+            f"The parameters are not physically consistent: {'; '.join(possible.reasons)}. Use {asked_for('--method consistent')} for parameters that are."
         )
         below = below_zero_said(identification.estimate, identification.training)
         if below is not None:
