@@ -12,7 +12,15 @@ from numpy.typing import NDArray
 from scara_ident.arrays import Array
 from scara_ident.inspection.chain import is_still, with_locked
 from scara_ident.inspection.efforts import is_computed, is_torque, why_taken
-from scara_ident.inspection.names import CURRENT, JOINT_STATES, LINK_SIDE, TORQUE, Meaning, nameless
+from scara_ident.inspection.names import (
+    CURRENT,
+    JOINT_STATES,
+    LINK_SIDE,
+    TORQUE,
+    Meaning,
+    nameless,
+    states_as_positions,
+)
 from scara_ident.inspection.second_encoder import second_encoder
 from scara_ident.inspection.signals import Signal, groups, of_group, of_other_kind, short_together
 from scara_ident.inspection.values import (
@@ -34,6 +42,8 @@ CLOCKS = ("time", "__time", "timestamp", "t")
 # Of a format in SI: when the state was measured, and when it was received.
 STATED_CLOCKS = ("time", "receive_time")
 
+# What there is to check where the positions are a state, as in data for learning such as LeRobot's: some hold a pose, or shares of a range.
+OF_STATE = "taken as positions, because nothing else is named so: check that they are angles of the joints, not a pose or shares of their range"
 # What to do where a log has a file for every quantity.
 APART = "if they are in a separate file, put the columns of both side by side in one file"
 
@@ -93,6 +103,10 @@ def guess(
     beside = ""
     for quantity in ("position", "effort", "velocity", "temperature"):
         signal = _find_signal(result, quantity, usable, numbers, robot, beside)
+        if signal is None and quantity == "position":
+            signal = _find_signal(result, quantity, states_as_positions(usable), numbers, robot, beside)
+            if signal is not None:
+                result.notes.append(f"position: {signal.pattern} {OF_STATE}")
         if signal is not None:
             result.signals[quantity] = signal
             beside = beside or signal.template
