@@ -12,6 +12,7 @@ from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 
+from scara_ident.calling import asked_for
 from scara_ident.errors import MemoryLimit, UsageError
 
 GIGA = 1e9
@@ -40,7 +41,7 @@ def set_limit(gigabytes: float | None) -> None:
         If it is less than what reading any file takes.
     """
     if gigabytes is not None and not gigabytes >= MIN_SHARE:
-        raise UsageError(f"--max-memory {gigabytes:g}: expected at least {MIN_SHARE:g} GB")
+        raise UsageError(f"{asked_for('--max-memory', 'gigabytes')} {gigabytes:g}: expected at least {MIN_SHARE:g} GB")
     _given[:] = [] if gigabytes is None else [gigabytes * GIGA]
 
 
@@ -113,7 +114,8 @@ def keep_freed() -> None:
 
 
 def _too_much(path: Path, what: str) -> MemoryLimit:
-    return MemoryLimit(f"{path}: reading it takes {what}; cut the file, or allow more with --max-memory")
+    more = asked_for("--max-memory", "scara_ident.memory.set_limit")
+    return MemoryLimit(f"{path}: reading it takes {what}; cut the file, or allow more with {more}")
 
 
 def _narrow() -> tuple[int, int] | None:

@@ -18,7 +18,7 @@ PACKAGE = ROOT / "scara_ident"
 # `paper` is closed forms and printed tables alone, and excitation and simulation repeat its motions; `inspection`
 # weighs efforts by the URDF's masses, so it comes after the model; `export` writes what `identification` found.
 ROOMS = (
-    "errors", "arrays", "threads", "processes", "progress", "registry", "files", "memory", "quiet",
+    "errors", "calling", "arrays", "threads", "processes", "progress", "registry", "files", "memory", "quiet",
     "manners",
     "robot", "paper", "recording", "motion", "model", "estimation", "inspection", "identification",
     "effects", "diagnosis", "inquiry", "online", "excitation", "export", "simulation", "fleet", "use", "report", "asking", "cli",

@@ -50,7 +50,7 @@ def test_results_of_gigabytes_are_refused_unread(tmp_path: Path):
     path.write_text("{}")
     assert read_text(path) == "{}"
     os.truncate(path, 30_000_000)
-    with pytest.raises(MemoryLimit, match="--max-memory"):
+    with pytest.raises(MemoryLimit, match="set_limit"):
         read_text(path)
 
 
@@ -58,15 +58,15 @@ def test_the_limit_is_half_of_the_machine_unless_set():
     assert limit() == 0.2 * GIGA
     set_limit(None)
     assert 0.05 * GIGA < limit() < 1e15
-    with pytest.raises(UsageError, match="--max-memory"):
+    with pytest.raises(UsageError, match=r"^gigabytes "):
         set_limit(0.5 * MIN_SHARE)
-    with pytest.raises(UsageError, match="--max-memory"):
+    with pytest.raises(UsageError, match=r"^gigabytes "):
         set_limit(float("nan"))
 
 
 def test_what_would_take_too_much_is_said_in_one_line():
     check_memory(Path("a.csv"), 0.1 * GIGA)
-    with pytest.raises(MemoryLimit, match=r"a.csv: .*0.3 GB.*more than 0.2 GB; cut the file, .*--max-memory"):
+    with pytest.raises(MemoryLimit, match=r"a.csv: .*0.3 GB.*more than 0.2 GB; cut the file, .*set_limit"):
         check_memory(Path("a.csv"), 0.3 * GIGA)
 
 
@@ -99,7 +99,7 @@ def test_a_small_file_that_unpacks_to_gigabytes_is_refused(tmp_path: Path, kind:
             file.write(b"time,joint1.position\n")
             file.truncate(100_000_000)
     assert kind == "csv" or path.stat().st_size < 1_000_000
-    with pytest.raises(MemoryLimit, match=f"small.{kind}: .*--max-memory"):
+    with pytest.raises(MemoryLimit, match=f"small.{kind}: .*set_limit"):
         column_names(path)
         read_columns(path, ["time"])
 
@@ -109,7 +109,7 @@ def test_a_forged_length_in_a_bag_is_refused(tmp_path: Path):
     pytest.importorskip("rosbags")
     path = tmp_path / "a.mcap"
     path.write_bytes(b"\x89MCAP0\r\n\x01" + struct.pack("<Q", 2**33) + bytes(100))
-    with pytest.raises(MemoryLimit, match=r"a\.mcap: .*--max-memory"):
+    with pytest.raises(MemoryLimit, match=r"a\.mcap: .*set_limit"):
         column_names(path)
 
 

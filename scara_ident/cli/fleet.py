@@ -57,9 +57,9 @@ def fleet(
     }
     said = ", ".join(f"{count} {kind}" for kind, count in counts.items() if count)
     console.print(f"{len(found.arms)} arms of {arm.name}: {said}", style="bold")
-    rows = table("arms, the most urgent first", "arm", "what changed")
+    rows = table("arms, the most urgent first", "arm", "what changed, or is unlike other arms")
     for item in found.ranked:
-        for k, words in enumerate(item.sentences):
+        for k, words in enumerate((*item.sentences, *item.oddities)):
             rows.add_row("" if k else item.arm, words)
     if rows.row_count:
         console.print(rows)

@@ -15,6 +15,7 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 
+from scara_ident.calling import by_command
 from scara_ident.cli import options
 from scara_ident.cli.ask import ask
 from scara_ident.cli.base import base
@@ -106,7 +107,7 @@ def _commands() -> Callable[..., Any]:
 def run(arguments: list[str]) -> int:
     """Run the program and return its exit status: 0 done, 1 the data or model cannot give it, 2 bad usage."""
     try:
-        with plugin_notices(), _ended_tidily():
+        with by_command(), plugin_notices(), _ended_tidily():
             result = _commands()(args=arguments, prog_name="scara-ident", standalone_mode=False)
         status = int(result) if isinstance(result, int) else 0
         if status == INTERRUPTED:

@@ -45,6 +45,7 @@ from scara_ident.identification.arguments import Recordings, model_of, recording
 from scara_ident.identification.channel_check import channel_faults
 from scara_ident.identification.clock_check import clock_drift
 from scara_ident.identification.events import Event, find_events, same_events, without_events
+from scara_ident.identification.gain_check import gain_said
 from scara_ident.identification.identify import check_bands, check_held_out
 from scara_ident.identification.usable import check_rows, usable_in_bands, with_rows
 from scara_ident.manners import Saved
@@ -243,7 +244,8 @@ def diagnose(
     faults = channel_faults(observations)
     if faults:
         raise RecordingError("; ".join(str(fault) for fault in faults))
-    notes[:0] = (*robot.notes, *base.notes)
+    gain = gain_said(observations)
+    notes[:0] = (*robot.notes, *base.notes, *([] if gain is None else [gain]))
     known = frozenset(unloaded)
     families = tuple(item.knowing(known) for item in families)
     # A catalogue with everything that is built in is not a request for single effects.

@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from scara_ident.arrays import Array
+from scara_ident.calling import asked_for
 from scara_ident.diagnosis.diagnose import Diagnosis
 from scara_ident.errors import ArgumentError, ScaraIdentError, UsageError
 from scara_ident.estimation.information import Information, merge
@@ -294,7 +295,7 @@ def _check_asked(
     if not inquiry.questions:
         raise ScaraIdentError("the diagnosis left no question that a motion could answer; no recording is needed")
     if criterion is not None or trajectories > 1 or family != "fourier":
-        raise UsageError("a motion for --tell is one trajectory of harmonics, and takes no criterion")
+        raise UsageError(f"a motion for {asked_for('--tell')} is one trajectory of harmonics, and takes no criterion")
     asked = inquiry.scene.model
     if asked.names != model.names:
         raise UsageError(

@@ -9,6 +9,7 @@ from typing import TypeVar
 import numpy as np
 
 from scara_ident.arrays import Array
+from scara_ident.calling import asked_for
 from scara_ident.errors import RobotError, ScaraIdentError, UsageError
 from scara_ident.excitation.clearance import Box, Clearance
 from scara_ident.excitation.tool import Tool, tool_motion, tool_of
@@ -201,8 +202,16 @@ def _check_stated(robot: Robot, lower: Array, upper: Array, velocity: Array) -> 
     ]
     if not asked:
         return
-    words = [f"--range {name}=LOWER..UPPER" for name, lacks in zip(robot.joints, ranges, strict=True) if lacks]
-    words += [f"--velocity {name}=V" for name, lacks in zip(robot.joints, speeds, strict=True) if lacks]
+    words = [
+        asked_for(f"--range {name}=LOWER..UPPER", f"ranges={{{name!r}: (LOWER, UPPER)}}")
+        for name, lacks in zip(robot.joints, ranges, strict=True)
+        if lacks
+    ]
+    words += [
+        asked_for(f"--velocity {name}=V", f"velocities={{{name!r}: V}}")
+        for name, lacks in zip(robot.joints, speeds, strict=True)
+        if lacks
+    ]
     raise RobotError(
         f"{robot.urdf}: {', '.join(asked)}; give <limit lower= upper= velocity=> in the URDF, which hold for a joint of type "
         f"revolute or prismatic and are more than 0, or {' '.join(words)}, in rad or m"

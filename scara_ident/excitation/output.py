@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from scara_ident.arrays import Array
+from scara_ident.calling import asked_for
 from scara_ident.errors import ScaraIdentError, UsageError
 from scara_ident.estimation.information import Information
 from scara_ident.excitation.criteria import BlockLogDet, Condition
@@ -276,7 +277,7 @@ def _foreseen(design: Design) -> str:
     if not np.any(np.delete(design.nominal, np.r_[model.place(model.rigid_body)])):
         if lacking := _rotors_left_out(design):
             foreseen = f"Torques were predicted with the URDF's bodies, without {lacking}"
-        return f"{foreseen}, without friction: identify once, and give the result with --parameters."
+        return f"{foreseen}, without friction: identify once, and give the result with {asked_for('--parameters', 'known')}."
     own = scara03_friction(model.robot)
     if own and all(own[name] == value for name, value in zip(model.names, design.nominal, strict=True) if name in own):
         return f"{foreseen} and the friction of the paper's Table 5 (OJD)."

@@ -9,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from scara_ident.arrays import Array
+from scara_ident.calling import asked_for
 from scara_ident.errors import ScaraIdentError
 from scara_ident.model.base_parameters import pseudo_inertia
 from scara_ident.robot.robot import Robot
@@ -83,7 +84,7 @@ def check_standard(robot: Robot, standard: Array) -> tuple[Array, Array]:
     if standard.shape != (11 * robot.n,):
         raise ValueError(f"standard parameters have shape {standard.shape}; expected ({11 * robot.n},)")
     bodies = standard[: 10 * robot.n].reshape(robot.n, 10)
-    advice = "no real link has it; estimate with --method consistent"
+    advice = f"no real link has it; estimate with {asked_for('--method consistent')}"
     for link, body in zip(robot.links, bodies, strict=True):
         if not np.all(np.isfinite(body)):
             raise ScaraIdentError(f"{link}: its inertial parameters are not all finite; nothing can be exported")

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
+from scara_ident.calling import asked_for
 from scara_ident.effects import EFFECTS, Effect, EffectTerm, Interval, Member, Scene
 from scara_ident.effects.signals import LinkTorque
 from scara_ident.errors import ScaraIdentError
@@ -99,7 +100,7 @@ def _model_of(
     entries = [(item["name"], item["joint"], item["meaning"]) for item in parameters]
     if entries != [(column.name, column.joint, column.meaning) for column in model.columns]:
         raise ScaraIdentError(
-            f"{path}: its parameters are not those of {arm.urdf}; give --robot of the arm it was found on"
+            f"{path}: its parameters are not those of {arm.urdf}; give {asked_for('--robot')} of the arm it was found on"
         )
     observations = {
         kind: tuple(_information(item, own, len(parameters)) for item, own in zip(rows, model.active, strict=True))
@@ -221,9 +222,13 @@ def _robot_entry(robot: Robot) -> dict[str, Any]:
 def _robot(entry: Mapping[str, Any], path: Path) -> Robot:
     urdf = Path(entry["urdf"])
     if not urdf.is_file():
-        raise ScaraIdentError(f"{path}: the URDF that it was found with, {urdf}, is not there; give --robot")
+        raise ScaraIdentError(
+            f"{path}: the URDF that it was found with, {urdf}, is not there; give {asked_for('--robot')}"
+        )
     if sha256(urdf.read_bytes()).hexdigest() != entry["sha256"]:
-        raise ScaraIdentError(f"{path}: {urdf} has changed since; give the URDF that it was found with as --robot")
+        raise ScaraIdentError(
+            f"{path}: {urdf} has changed since; give the URDF that it was found with as {asked_for('--robot')}"
+        )
     return build_robot(check_description({"urdf": str(urdf), **entry["description"]}, path), path)
 
 

@@ -23,6 +23,7 @@ from scara_ident.fleet.changes import (
 )
 from scara_ident.fleet.folder import Fault, date_notes, list_fleet
 from scara_ident.fleet.history import History
+from scara_ident.fleet.odd import Oddity, odd_arms
 from scara_ident.fleet.scatter import fleet_scatter
 from scara_ident.fleet.store import FOLDER, Store
 from scara_ident.fleet.table import Quantity, quantities
@@ -33,6 +34,9 @@ from scara_ident.model.model import TorqueModel, build_model
 from scara_ident.progress import Tell, silent
 from scara_ident.robot.robot import Robot
 from scara_ident.threads import one_thread
+
+# Of an arm so many parameters are said that are unlike others': one that is off in all of them is named by the farthest.
+MAX_ODD = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +55,8 @@ class ArmReport:
     faults : tuple of Fault
     determined : bool
         Whether the fleet has dates enough to tell a change from what differs by nature.
+    odd : tuple of Oddity
+        Parameters that are far from those of the other arms on its first date, the farthest first.
     """
 
     arm: str
@@ -59,6 +65,7 @@ class ArmReport:
     diagnosis: Mapping[str, Any] | None = None
     faults: tuple[Fault, ...] = ()
     determined: bool = True
+    odd: tuple[Oddity, ...] = ()
 
     @property
     def known(self) -> History:
@@ -82,6 +89,13 @@ class ArmReport:
     def sentences(self) -> tuple[str, ...]:
         """What changed, in words, a sentence for each cause."""
         return sentences(self.changes, self.known.scene) if self.changes else ()
+
+    @property
+    def oddities(self) -> tuple[str, ...]:
+        """What is unlike other arms on its first date, in words; of many parameters the farthest."""
+        more = len(self.odd) - MAX_ODD
+        said = tuple(f"On its first date {item.words}" for item in self.odd[:MAX_ODD])
+        return (*said, f"So are {several(more, 'more parameter')}") if more > 0 else said
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,8 +122,12 @@ class Fleet:
 
     @property
     def ranked(self) -> tuple[ArmReport, ...]:
-        """The arms by their need of a look: the surest change first, then faults, then the rest by name."""
-        return tuple(sorted(self.arms, key=lambda item: (not item.changes, -_surest(item), not item.faults, item.arm)))
+        """The arms by their need of a look: the surest change first, then what is unlike others, then faults, then the rest by name."""
+
+        def need(item: ArmReport) -> tuple[object, ...]:
+            return not item.changes, -_surest(item), -_farthest(item), not item.faults, item.arm
+
+        return tuple(sorted(self.arms, key=need))
 
     @property
     def reservation(self) -> str | None:
@@ -181,6 +199,8 @@ def watch_fleet(
             work.diagnose({arm: histories[arm].dates[-1] for arm, found in changes.items() if found}, by_arm, engine)
     arms = sorted({*by_arm, *(fault.arm for fault in work.faults)})
     determined = _steps(histories.values()) >= FEWEST_STEPS
+    told = quantities(list(histories.values()))
+    odd = odd_arms(model, {arm: dates[0] for arm, dates in told.items()})
     reports = tuple(
         ArmReport(
             arm,
@@ -189,10 +209,11 @@ def watch_fleet(
             work.diagnoses.get(arm),
             tuple(sorted((item for item in work.faults if item.arm == arm), key=str)),
             determined,
+            odd.get(arm, ()),
         )
         for arm in arms
     )
-    return Fleet(robot, model, reports, quantities(list(histories.values())), date_notes(files))
+    return Fleet(robot, model, reports, told, date_notes(files))
 
 
 def changes_of(histories: Sequence[History]) -> dict[str, tuple[Change, ...]]:
@@ -225,6 +246,10 @@ def changes_of(histories: Sequence[History]) -> dict[str, tuple[Change, ...]]:
 def _steps(histories: Iterable[History]) -> int:
     """Return how many differences between neighbouring dates there are."""
     return sum(len(item.dates) - 1 for item in histories)
+
+
+def _farthest(report: ArmReport) -> float:
+    return max((abs(item.stds) for item in report.odd), default=0.0)
 
 
 def _surest(report: ArmReport) -> float:

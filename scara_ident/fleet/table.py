@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 SEEN_SHARE = 1e-5
 COLUMNS = (
     "arm", "date", "quantity", "joint", "unit", "parameter", "std", "effect", "since", "error", "verdict", "changes",
-    "fault",
+    "fault", "odd",
 )  # fmt: skip
 
 
@@ -109,6 +109,7 @@ def fleet_table(fleet: Fleet) -> pl.DataFrame:
     rows: list[Mapping[str, Any]] = []
     for report in fleet.arms:
         of_arm = {"arm": report.arm, "verdict": report.verdict, "changes": "; ".join(report.sentences) or None}
+        of_arm["odd"] = "; ".join(report.oddities) or None
         nothing = dict.fromkeys(COLUMNS) | of_arm
         dates = fleet.quantities.get(report.arm, ())
         for k, each in enumerate(dates):

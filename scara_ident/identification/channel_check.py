@@ -79,7 +79,7 @@ def channel_faults(observations: Observations) -> tuple[ChannelFault, ...]:
 def _faults(held: Observations) -> tuple[ChannelFault, ...]:
     model = held.model
     joints = model.robot.joints
-    bands = _wide(held)
+    bands = wide_bands(held)
     errors = relative(weighted_value(held.by_joint), held)
     narrow = few(held)
     if narrow or any(errors[j] > NARROWED and bands[j] != held.data.bands[j] for j in range(len(joints))):
@@ -109,7 +109,7 @@ def _faults(held: Observations) -> tuple[ChannelFault, ...]:
     return merged(faults, joints)
 
 
-def _wide(observations: Observations) -> tuple[float | None, ...]:
+def wide_bands(observations: Observations) -> tuple[float | None, ...]:
     """Return bands that any arm fills, as wide as the widest chosen, which is of a joint that is read rightly if any is."""
     data = observations.data
     widest = max((band for band in data.bands if band is not None), default=MOVED)

@@ -56,8 +56,7 @@ class ChannelFault:
 
     def __str__(self) -> str:
         """Say what, and what to do."""
-        before = f"{100 * self.error:.2g}" if self.error < 0.99 else f"{100 * self.error:.0f}"
-        gain = f"the unexplained part of the torque falls from {before} to {100 * self.mended:.2g} %"
+        gain = f"the unexplained part of the torque falls from {percent(self.error)} to {percent(self.mended)} %"
         names = (" and " if self.exchanged else ", ").join(self.joints)
         if self.unsigned:
             return (
@@ -107,6 +106,11 @@ class ChannelFault:
             f"{said}; {mend}{'then ' if mend else ''}add in robot.yaml under recording, position: offset: {{{lines}}} in "
             f"rad, or the same angle in the unit there"
         )
+
+
+def percent(share: float) -> str:
+    """Return a share in percent, of two digits or whole."""
+    return f"{100 * share:.2g}" if share < 0.99 else f"{100 * share:.0f}"
 
 
 def faults_of(

@@ -30,6 +30,7 @@ from scara_ident.identification.channel_check import channel_faults
 from scara_ident.identification.channel_fault import ChannelFault, refuse_exchanged
 from scara_ident.identification.clock_check import clock_drift
 from scara_ident.identification.events import Event, event_notes, find_events
+from scara_ident.identification.gain_check import gain_said
 from scara_ident.identification.long_recordings import with_all_samples
 from scara_ident.identification.recording_check import held_out_events
 from scara_ident.identification.usable import check_rows, usable_in_bands
@@ -249,7 +250,8 @@ def identify(
         differs = disagreement(plain, robust)
     events += () if faults else held_out_events(estimate.value, training, validated)
     drift = None if faults else clock_drift(estimate.value, training.in_memory)
-    notes += event_notes(robot, events) + [said for said in (differs, drift) if said is not None]
+    gain = None if faults else gain_said(training.in_memory)
+    notes += event_notes(robot, events) + [said for said in (gain, differs, drift) if said is not None]
     if isinstance(estimate, ConsistentEstimate):
         notes += estimate.notes
     log_notes(_LOG, (*map(str, faults), *notes))

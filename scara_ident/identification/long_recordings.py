@@ -112,8 +112,8 @@ def _absorb(held: _Absorbed, observations: Observations, part: Recording, value:
     held.samples += rows.samples
     later = float(part.time[0]) - origin
     held.events += [event.later(later) for event in events]
-    for finding in part.findings:
-        held.said.setdefault(finding.kind, []).append(finding.message)
+    for kind, message in {finding.kind: finding.message for finding in reversed(part.findings)}.items():
+        held.said.setdefault(kind, []).append(message)
     held.absorb(joints)
 
 

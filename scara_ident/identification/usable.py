@@ -14,6 +14,7 @@ from scara_ident.estimation.bands import BandChoice, choose_bands
 from scara_ident.estimation.observations import Observations, kept_rows
 from scara_ident.identification.held_at_once import held_at_once
 from scara_ident.identification.in_step import in_step
+from scara_ident.manners import listed
 from scara_ident.memory import keep_freed
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.motion import torque_of
@@ -29,8 +30,8 @@ from scara_ident.threads import side_by_side
 MOSTLY = 0.5
 # Number of recordings that a note lists by name; for more there is one note, with the numbers of the first.
 LISTED = 3
-# A number that is not part of a name.
-_NUMBER = re.compile(r"(?<![\w.])[-+]?\d[\w.+-]*")
+# A number that is not part of a name, and the plural of words behind it: once or several times.
+_NUMBER = re.compile(r"(?<![\w.])[-+]?\d[\w.+-]*|(?<=[a-z])s\b")
 # An rms of so many independent values is known to 1 / sqrt(2 N), here 22 % (the standard error of a standard deviation).
 MIN_ROWS = 10
 
@@ -162,6 +163,7 @@ def with_rows(data: PreparedData, robot: Robot, *, needed: bool) -> tuple[Prepar
         (
             str(item.recording.path or item.name),
             f"{count} independent rows remain without the ends and the times at rest{_because(item, robot)}; left out",
+            None,
         )
         for item, count in zip(data.recordings, rows, strict=True)
         if count < MIN_ROWS
@@ -197,27 +199,31 @@ def data_notes(*data: PreparedData) -> list[str]:
     """Return the findings of the audits, with one line for the same finding on many recordings, and contradictions of names and motions."""
     items = [item for part in data for item in part.recordings]
     audits = side_by_side(lambda item: audit_velocity(item.recording, item.longest.stretch), items)
-    notes = _once((item.name, finding.message) for item in items for finding in item.recording.findings)
+    notes = _once((item.name, finding.message, finding.joint) for item in items for finding in item.recording.findings)
     audited = [(item.name, item.longest.rate, own) for item, own in zip(items, audits, strict=True)]
     notes += [f"{_listed(names)}: {remark}" for names, remark in velocity_remarks(audited)]
     return [*notes, *(note for part in data for note in part.motions.notes)]
 
 
-def _once(said: Iterable[tuple[str, str]]) -> list[str]:
-    """Return remarks on recordings, each a name and a remark, with one line for the same remark on many."""
-    found: dict[str, dict[str, list[str]]] = {}
-    for name, remark in said:
-        found.setdefault(_NUMBER.sub("", remark), {}).setdefault(remark, []).append(name)
+def _once(said: Iterable[tuple[str, str, str | None]]) -> list[str]:
+    """Return remarks on recordings, each a name, a remark and a joint, with one line for the same remark on many."""
+    found: dict[str, dict[tuple[str, str | None], list[str]]] = {}
+    for name, remark, joint in said:
+        alike = _NUMBER.sub("", remark if joint is None else remark.removeprefix(joint))
+        found.setdefault(alike, {}).setdefault((remark, joint), []).append(name)
     return [note for alike in found.values() for note in _in_one(alike)]
 
 
-def _in_one(alike: Mapping[str, Sequence[str]]) -> list[str]:
-    """Return remarks that differ by their numbers, each with its recordings, or one for all where they are many."""
+def _in_one(alike: Mapping[tuple[str, str | None], Sequence[str]]) -> list[str]:
+    """Return remarks that differ by their joints and numbers, each with its recordings, or one for all where they are many."""
     names = list(dict.fromkeys(chain.from_iterable(alike.values())))
-    if len(alike) == 1 or len(names) <= LISTED:
-        return [f"{_listed(own)}: {remark}" for remark, own in alike.items()]
-    first, own = next(iter(alike.items()))
-    return [f"{_listed(names)}: {first}; numbers of {own[0]}"]
+    if len(alike) == 1 or max(len(names), len(alike)) <= LISTED:
+        return [f"{_listed(own)}: {remark}" for (remark, _), own in alike.items()]
+    (first, joint), own = next(iter(alike.items()))
+    others = dict.fromkeys(other for _, other in alike if other not in (None, joint))
+    if not others:
+        return [f"{_listed(names)}: {first}; numbers of {own[0]}"]
+    return [f"{_listed(names)}: {first}; so {listed(list(others), LISTED)}; numbers of {joint} in {own[0]}"]
 
 
 def _listed(names: Sequence[str]) -> str:

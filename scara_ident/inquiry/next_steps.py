@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 from weakref import WeakKeyDictionary
 
+from scara_ident.calling import asked_for
 from scara_ident.diagnosis.diagnose import Diagnosis
 from scara_ident.diagnosis.selection.tentative import settled_by
 from scara_ident.diagnosis.testing.acceptance import Decision
@@ -158,7 +159,7 @@ def _recordings(diagnosis: Diagnosis) -> Iterator[NextStep]:
         longest = diagnosis.search.scene.duration
         yield NextStep(
             "whether the result holds elsewhere",
-            "record another trajectory for validation only, and give it with --validate",
+            f"record another trajectory for validation only, and give it with {asked_for('--validate', 'validation')}",
             longest,
         )
     speeds = "record the same path at another speed, to distinguish a delay from what depends on speed"

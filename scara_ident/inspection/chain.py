@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from scara_ident.arrays import Array
+from scara_ident.calling import asked_for
 from scara_ident.errors import UsageError
 from scara_ident.robot.description import RobotDescription
 from scara_ident.robot.robot import Robot, build_robot
@@ -37,9 +38,11 @@ def arm_of(urdf: Path, pattern: str | None = None) -> Robot:
     try:
         wanted = [name for name in names if re.fullmatch(pattern, name)]
     except re.error as error:
-        raise UsageError(f"--joints: {pattern!r} is no regular expression: {error}; as in 'arm_.*'") from None
+        raise UsageError(
+            f"{asked_for('--joints')}: {pattern!r} is no regular expression: {error}; as in 'arm_.*'"
+        ) from None
     if not wanted:
-        raise UsageError(f"--joints: {pattern!r} matches no joint; {urdf} has {', '.join(names)}")
+        raise UsageError(f"{asked_for('--joints')}: {pattern!r} matches no joint; {urdf} has {', '.join(names)}")
     return build_robot(whole.model_copy(update={"joints": dict.fromkeys(wanted)}), urdf)
 
 

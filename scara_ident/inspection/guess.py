@@ -11,7 +11,16 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.inspection.chain import is_still, with_locked
-from scara_ident.inspection.names import CURRENT, JOINT_STATES, LINK_SIDE, TORQUE, Meaning, nameless
+from scara_ident.inspection.efforts import is_computed, is_torque, why_taken
+from scara_ident.inspection.names import (
+    CURRENT,
+    JOINT_STATES,
+    LINK_SIDE,
+    TORQUE,
+    Meaning,
+    nameless,
+    states_as_positions,
+)
 from scara_ident.inspection.second_encoder import second_encoder
 from scara_ident.inspection.signals import Signal, groups, of_group, of_other_kind, short_together
 from scara_ident.inspection.values import (
@@ -33,6 +42,8 @@ CLOCKS = ("time", "__time", "timestamp", "t")
 # Of a format in SI: when the state was measured, and when it was received.
 STATED_CLOCKS = ("time", "receive_time")
 
+# What there is to check where the positions are a state, as in data for learning such as LeRobot's: some hold a pose, or shares of a range.
+OF_STATE = "taken as positions, because nothing else is named so: check that they are angles of the joints, not a pose or shares of their range"
 # What to do where a log has a file for every quantity.
 APART = "if they are in a separate file, put the columns of both side by side in one file"
 
@@ -92,6 +103,10 @@ def guess(
     beside = ""
     for quantity in ("position", "effort", "velocity", "temperature"):
         signal = _find_signal(result, quantity, usable, numbers, robot, beside)
+        if signal is None and quantity == "position":
+            signal = _find_signal(result, quantity, states_as_positions(usable), numbers, robot, beside)
+            if signal is not None:
+                result.notes.append(f"position: {signal.pattern} {OF_STATE}")
         if signal is not None:
             result.signals[quantity] = signal
             beside = beside or signal.template
@@ -176,6 +191,7 @@ def _find_signal(
         moving = sum(not is_still(numbers[column]) for column in signal.columns.values())
         rank = (
             said.commanded,
+            is_computed(said),
             any(
                 of_other_kind(meanings[column], quantity, bool(robot.prismatic[k]))
                 for k, column in signal.columns.items()
@@ -185,7 +201,7 @@ def _find_signal(
             bool(said.words & LINK_SIDE),
             not by_name,
             not said.measured,
-            not said.words & TORQUE,
+            not is_torque(said),
             # Channels of one source begin alike.
             -sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], zip(template, beside, strict=False))),
             order,
@@ -199,14 +215,17 @@ def _find_signal(
     if note:
         result.notes.append(note)
     taken = set(best.columns.values())
-    others = [signal.pattern for _, signal, _ in found[1:] if not taken & set(signal.columns.values())]
+    others = [signal for _, signal, _ in found[1:] if not taken & set(signal.columns.values())]
     if others:
-        result.notes.append(f"{quantity}: {best.pattern} taken, not {', '.join(others[:3])}")
+        said_of = [] if quantity != "effort" else [why_taken(best, other, meanings, numbers) for other in others]
+        why = "".join(f": {reason}" for reason in list(filter(None, said_of))[:1])
+        result.notes.append(f"{quantity}: {best.pattern} taken, not {', '.join(s.pattern for s in others[:3])}{why}")
     still = [robot.joints[k] for k, column in best.columns.items() if is_still(numbers[column])]
     if 0 < len(still) < len(best.columns):
         result.notes.append(f"{quantity}: constant for {', '.join(still)}; check its columns")
-    if first[0]:
-        result.notes.append(f"{quantity}: {best.pattern} seems to be a command, not a measurement, by its name")
+    if first[0] or first[1]:
+        kind = "a command" if first[0] else "computed"
+        result.notes.append(f"{quantity}: {best.pattern} seems to be {kind}, not a measurement, by its name")
     return best
 
 

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from scara_ident.arrays import Array
+from scara_ident.calling import asked_for
 from scara_ident.errors import MemoryLimit, RecordingError, UsageError
 from scara_ident.files import path_fault
 from scara_ident.inspection.chain import arm_of, longest_chain
@@ -130,11 +131,15 @@ def inspect_file(
     """
     path = Path(path)
     if urdf is not None and robot is not None:
-        raise UsageError("--urdf and --robot: give one; a robot description names its URDF")
+        raise UsageError(
+            f"{asked_for('--urdf and --robot', 'urdf and robot')}: give one; a robot description names its URDF"
+        )
     if (fault := path_fault(path)) is not None:
         raise UsageError(fault)
     if joints is not None and urdf is None:
-        raise UsageError("--joints: says which joints of a URDF to identify; give --urdf")
+        raise UsageError(
+            f"{asked_for('--joints')}: says which joints of a URDF to identify; give {asked_for('--urdf')}"
+        )
     if not path.exists():
         raise UsageError(f"{path}: no such file or folder")
     if path.is_dir() and not is_bag_folder(path):
@@ -192,8 +197,10 @@ def _moving_alone(recording: Recording | None) -> list[str]:
     moving = [re.escape(name) for joint, name in enumerate(recording.joints) if joint not in idle]
     if not idle or not moving:
         return []
+    one = "|".join(moving)
+    alone = asked_for(f"--joints '{one}'", f"joints={one!r}")
     return [
-        f"if no recording moves more than {listed(moving, MAX_NAMED)}, --joints '{'|'.join(moving)}' identifies "
+        f"if no recording moves more than {listed(moving, MAX_NAMED)}, {alone} identifies "
         f"{'it' if len(moving) == 1 else 'them'} alone, with the other joints locked at their positions here"
     ]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -46,6 +46,11 @@ MEASURED = frozenset(
     ["actual", "act", "measured", "meas", "feedback", "fb", "sensor", "ist", "akt", "aktuell", "gemessen", "mesure",
      "mesuree", "reel"]
 )  # fmt: skip
+# Of an effort that was computed from a model of the arm; an estimate may as well be of a current.
+COMPUTED = frozenset(
+    ["model", "modelled", "modeled", "computed", "calculated", "calc", "predicted", "ff", "feedforward", "theoretical",
+     "modell", "berechnet", "vorsteuerung", "modele", "calcule", "theorique"]
+)  # fmt: skip
 # Of such columns no channel of a joint is made.
 OTHER = frozenset(
     ["error", "err", "std", "min", "max", "limit", "limits", "tcp", "tool", "cartesian", "pose", "gripper", "imu",
@@ -55,6 +60,10 @@ OTHER = frozenset(
 LINK_SIDE = frozenset(("link", "load", "output", "secondary", "second", "se", "abtrieb", "abtriebsseitig"))
 # Of what turns; a joint that slides has none of them.
 ANGLE = frozenset(("angle", "angles", "ang", "theta", "winkel", "drehwinkel"))
+# Of an arm its positions first of all, where nothing else is.
+STATE = frozenset(("state", "states"))
+# Of what is around the arm.
+AROUND = frozenset(("environment", "env", "object"))
 GENERIC = frozenset(("joint", "link", "axis", "motor", "gelenk", "achse", "axe", "articulation", "moteur"))
 CURRENT = frozenset(("current", "currents", "curr", "cur", "amp", "amps", "i", "strom", "courant", "courants"))
 # Such a word says that a value is of now where it stands before a quantity; before a letter, as in current_t, it is one.
@@ -180,6 +189,18 @@ def meaning(name: str, joints: Sequence[str] = ()) -> Meaning:
         stem=_without_unit(template),
         words=frozenset(spoken),
     )
+
+
+def states_as_positions(meanings: Mapping[str, Meaning]) -> dict[str, Meaning]:
+    """Return the columns of a state by number, such as ``observation.state[0]``, as positions, which the name alone does not say."""
+    return {
+        name: replace(said, quantity="position")
+        for name, said in meanings.items()
+        if said.quantity is None
+        and said.number is not None
+        and said.words & STATE
+        and not said.words & (OTHER | AROUND)
+    }
 
 
 def _without_accents(text: str) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+from scara_ident.calling import asked_for
 from scara_ident.inspection.chain import numbered_joints
 from scara_ident.inspection.names import ANGLE, Meaning, meaning
 from scara_ident.manners import several
@@ -123,7 +124,7 @@ def of_group(
     if joints is None:
         return None, (
             f"{quantity} {pattern}{SHORT}{several(len(numbered), 'channel')} for {robot.n} joints: not used without a mapping; "
-            "name the joints that are in the file, in --joints"
+            f"name the joints that are in the file, in {asked_for('--joints')}"
         )
     note = ""
     if len(numbered) > robot.n:

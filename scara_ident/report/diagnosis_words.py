@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from scara_ident.calling import asked_for
 from scara_ident.diagnosis.diagnose import Diagnosis
 from scara_ident.diagnosis.evidence.evidence import Evidence
 from scara_ident.diagnosis.evidence.outcome import Unexplained
@@ -154,7 +155,7 @@ def _curved(diagnosis: Diagnosis, remainder: Unexplained) -> str:
     laws = [term for term in diagnosis.before.model.terms if isinstance(term, Friction)]
     straight = all(max(law.powers) < 2 for law in laws)
     if straight and remainder.signals == (f"velocity of {remainder.joint}",):
-        return "; the model's friction is linear in speed: try --model complete"
+        return f"; the model's friction is linear in speed: try {asked_for('--model complete')}"
     return ""
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from scara_ident.calling import asked_for
 from scara_ident.estimation import Estimate, JointError
 from scara_ident.estimation.consistent.estimator import ConsistentEstimate, links
 from scara_ident.estimation.consistent.shape import ShapeChoice
@@ -155,7 +156,7 @@ def _others(identification: Identification) -> list[str]:
         found += [faster] if faster else []
     else:
         found.append(
-            "There are no held-out recordings: give --validate recordings to measure how well the model predicts."
+            f"There are no held-out recordings: give {asked_for('--validate', 'validation')} recordings to measure how well the model predicts."
         )
     open_, in_sums = undetermined(identification), determined_in_sums(identification)
     if in_sums:
@@ -168,7 +169,8 @@ def _others(identification: Identification) -> list[str]:
             f"The data do not determine {listed(open_, MAX_NAMED)}; record a motion that excites "
             f"{'it' if len(open_) == 1 else 'them'}."
         )
-    elif not in_sums:
+    small = insignificant_parameters(identification)
+    if not open_ and not in_sums and not small:
         found.append("Every parameter is determined.")
     possible = identification.physical_consistency
     if possible.possible:
@@ -178,15 +180,19 @@ def _others(identification: Identification) -> list[str]:
         found.append(f"{why[0].upper()}{why[1:]}.")
     else:
         found.append(
-            f"The parameters are not physically consistent: {'; '.join(possible.reasons)}. Use --method consistent for parameters that are."
+            f"The parameters are not physically consistent: {'; '.join(possible.reasons)}. Use {asked_for('--method consistent')} for parameters that are."
         )
         below = below_zero_said(identification.estimate, identification.training)
         if below is not None:
             found.append(below)
-    small = insignificant_parameters(identification)
-    if small:
-        found.append(f"Within two standard deviations of zero: {listed(small, MAX_NAMED)}.")
     unsure = of_unknown_std(identification)
+    if small:
+        every = len(identification.model.names)
+        known = every - len(open_) - len(unsure)
+        found.append(
+            f"{known - len(small)} of {known}{' determined' * (known < every)} parameters differ from zero by more than two standard "
+            f"deviations; not {listed(small, MAX_NAMED)}."
+        )
     if unsure:
         found.append(
             f"The standard deviation of {listed(unsure, MAX_NAMED)} is not known: almost all information about "

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -26,6 +27,8 @@ from scara_ident.robot.examples import example_urdf, is_name
 MIN_FACTOR, MAX_FACTOR = 1e-12, 1e12
 # Characters of a robot.yaml, and nodes of it with its aliases written out.
 MAX_CHARACTERS = 1_000_000
+# Bytes of no text in an encoding of one byte a letter, but tabs and ends of lines; UTF-16 has a 0 in every other byte.
+_NO_TEXT = re.compile(rb"[\x00-\x08\x0e-\x1f]")
 # What the key urdf takes.
 URDF = "the path of a URDF, or the name of a robot of example-robot-data"
 
@@ -241,7 +244,7 @@ def read_description(path: Path) -> RobotDescription:
     except OSError as error:
         raise RobotError(f"{path}: cannot be read: {error.strerror}") from None
     except UnicodeDecodeError:
-        raise RobotError(f"{path}: not a text file; expected a robot.yaml") from None
+        raise RobotError(f"{path}{_not_utf_8(path)}") from None
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         where = f", line {mark.line + 1}" if mark else ""
@@ -257,6 +260,20 @@ def read_description(path: Path) -> RobotDescription:
     except NoRobotError as error:
         raise RobotError(f"{path}: urdf: {error}") from None
     return description.model_copy(update={"urdf": real_path(urdf)})
+
+
+def _not_utf_8(path: Path) -> str:
+    """Say which letter of a file is in another encoding, and where; that it is no text where it has bytes that no text has."""
+    with path.open("rb") as file:
+        content = file.read(MAX_CHARACTERS)
+    try:
+        content.decode("utf-8")
+    except UnicodeDecodeError as error:
+        letter = content[error.start : error.start + 1].decode("cp1252", errors="ignore")
+        if letter and not _NO_TEXT.search(content):
+            line = content.count(b"\n", 0, error.start) + 1
+            return f", line {line}: a letter that is not in UTF-8, {letter!r} if it is in Windows-1252; save the file in UTF-8"
+    return ": not a text file in UTF-8; expected a robot.yaml"
 
 
 def _size(node: Any, known: dict[int, float]) -> float:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from scara_ident.arrays import Array
+from scara_ident.calling import asked_for
 from scara_ident.errors import RobotError, UsageError
 from scara_ident.export.identified_model import Entry, IdentifiedModel
 from scara_ident.manners import listed
@@ -106,7 +107,7 @@ def rotor_note(model: IdentifiedModel) -> str:
         return ""
     return (
         f"The fit has a negative rotor inertia, at the joint: {listed(said, 6)}. No arm has one: it is set to 0 in the "
-        f"virtual arm and in the feed-forward; identify with --method consistent, or from a motion with better "
+        f"virtual arm and in the feed-forward; identify with {asked_for('--method consistent')}, or from a motion with better "
         f"excitation."
     )
 
@@ -215,7 +216,7 @@ def _mean_inertia(arm: VirtualArm) -> Array:
         if np.linalg.eigvalsh(mass)[0] <= 0.0:
             raise RobotError(
                 f"{robot.name}: no arm with these parameters can move, because its inertia is not positive; identify "
-                f"with --method consistent, or from a motion with better excitation"
+                f"with {asked_for('--method consistent')}, or from a motion with better excitation"
             )
         total += np.diag(mass)[robot.order] / _POSES
     return total

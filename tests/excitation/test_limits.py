@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from scara_ident.calling import by_command
 from scara_ident.errors import RobotError, UsageError
 from scara_ident.excitation import (
     design_excitation,
@@ -21,7 +22,7 @@ from tests.excitation.made import panda
 
 def test_a_joint_without_limits_is_said(tmp_path):
     urdf = write_urdf(tmp_path / "arm.urdf", [Link(kind="continuous"), Link(xyz=(0.3, 0.0, 0.0))])
-    with pytest.raises(RobotError, match=r"joint 'j1' has no position limits;.*--range j1="):
+    with pytest.raises(RobotError, match=r"joint 'j1' has no position limits;.*or ranges={'j1': "):
         design_excitation(build_model(load_robot(urdf)))
     given = limits_of(load_robot(urdf), ranges={"j1": (-3.0, 3.0)}, share=1.0)
     assert given.upper[0] == 3.0
@@ -34,12 +35,16 @@ def test_all_limits_that_lack_are_said_at_once(tmp_path):
     """Of an arm that a CAD program wrote, continuous and with velocity="0", they were asked for one by one."""
     urdf = write_urdf(tmp_path / "arm.urdf", [Link(kind="continuous"), Link(xyz=(0.3, 0.0, 0.0))])
     urdf.write_text(urdf.read_text().replace(' velocity="4"', ' velocity="0"'))
-    with pytest.raises(RobotError) as caught:
+    with pytest.raises(RobotError) as caught, by_command():
         limits_of(load_robot(urdf))
     said = str(caught.value)
     assert "joint 'j1' has no position limits nor velocity limit, joint 'j2' has no velocity limit" in said
     assert "--range j1=LOWER..UPPER --velocity j1=V --velocity j2=V" in said
     assert "--range j2" not in said
+    with pytest.raises(RobotError) as caught:
+        limits_of(load_robot(urdf))
+    words = "ranges={'j1': (LOWER, UPPER)} velocities={'j1': V} velocities={'j2': V}"
+    assert words in str(caught.value) and "--" not in str(caught.value)
     given = {"ranges": {"j1": (-3.0, 3.0)}, "velocities": {"j1": 1.0, "j2": 1.0}}
     assert limits_of(load_robot(urdf), **given).upper[0] < 3.0
 

@@ -212,7 +212,7 @@ def test_a_robot_that_has_moved_can_be_given(content, read, tmp_path: Path):
     copy.write_bytes(Path(robot["urdf"]).read_bytes())
     gone = json.loads(json.dumps(content))
     gone[KEY]["robot"]["urdf"] = str(tmp_path / "gone.urdf")
-    with pytest.raises(ScaraIdentError, match=r"gone\.urdf, is not there; give --robot"):
+    with pytest.raises(ScaraIdentError, match=r"gone\.urdf, is not there; give robot$"):
         read(gone)
     description = tmp_path / "robot.yaml"
     description.write_text("urdf: scara03.urdf\neffort_side: motor\njoints: {joint1: {}, joint2: {}}\n")

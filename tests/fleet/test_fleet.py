@@ -13,8 +13,9 @@ import pytest
 
 from scara_ident.fleet import Settings, watch_fleet
 from scara_ident.fleet.table import COLUMNS, fleet_table
+from scara_ident.recording.recording import write_recording
 from scara_ident.robot.robot import load_robot
-from tests.fleet.made import DATES, WORN
+from tests.fleet.made import DATES, WORN, run_of
 
 pytestmark = pytest.mark.slow
 
@@ -140,3 +141,15 @@ def set_environment(values: dict[str, str]) -> None:
     import os
 
     os.environ.update(values)
+
+
+def test_an_arm_that_is_odd_from_its_first_date_on_is_named(tmp_path):
+    """With friction four times that of all others it had one date, or was unchanged, and that was all."""
+    for arm in range(1, 7):
+        place = tmp_path / "fleet" / f"arm{arm}" / DATES[0]
+        place.mkdir(parents=True)
+        write_recording(run_of(arm, 0, 4.0 if arm == 3 else 1.0), place / "OJD_1.parquet")
+    found = watch_fleet(str(tmp_path / "fleet"), load_robot(), tmp_path / "results", Settings(workers=1))
+    assert [item.arm for item in found.arms if item.odd] == ["arm3"] == [found.ranked[0].arm]
+    assert found.ranked[0].oddities[0].startswith("On its first date a02 (Coulomb friction of joint2) is ")
+    assert {item.verdict for item in found.arms} == {"one date"}

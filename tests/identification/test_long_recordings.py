@@ -105,6 +105,18 @@ def test_what_is_held_does_not_grow_and_all_samples_count_though_few_are_kept(ru
     assert any("of its 15000 samples 4500 are used, in 3 windows" in note for note in parts.notes)
 
 
+def test_a_remark_on_several_joints_of_a_part_is_of_one_part(run, tmp_path, monkeypatch):
+    """What was said of two joints of one part was said to be in two of four parts."""
+    turned = run.position.copy()
+    turned[:, 9_100:9_150] += 2.0 * np.pi
+    path = written(tmp_path, replace(run, position=turned))
+    monkeypatch.setattr(long_file, "KEPT_SAMPLES", 4_500)
+    monkeypatch.setattr(long_file, "WINDOWS", 3)
+    found = identify(ROBOT, in_parts(monkeypatch, path), bands=BANDS)
+    (note,) = (note for note in found.notes if "whole turn" in note)
+    assert "in 1 of 4 parts: joint1.position jumps by a whole turn" in note
+
+
 def test_a_part_that_cannot_be_used_is_left_out_and_named(run, tmp_path, monkeypatch):
     broken = run.position.copy()
     broken[0, 9_000:9_500] = np.nan

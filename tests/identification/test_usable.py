@@ -13,6 +13,7 @@ from scara_ident.estimation.observations import kept_rows, observe
 from scara_ident.identification.compare import compare
 from scara_ident.identification.identify import identify, known_information
 from scara_ident.identification.usable import check_rows, data_notes, usable_data, with_rows, without_copies
+from scara_ident.manners import several
 from scara_ident.model.model import build_model
 from scara_ident.motion.prepared import prepare
 from scara_ident.recording.audit.samples import Finding
@@ -238,6 +239,28 @@ def test_a_remark_on_many_recordings_is_one_line_with_the_numbers_of_the_first(r
     both = said(5, other, other.replace("joint1", "joint2"))
     assert len(both) == 2 and "joint2.effort" in both[1]
     assert said(5, "no stamps in 7 rows") == ["run_1 and 4 more recordings: no stamps in 7 rows"]
+
+
+def test_a_remark_on_many_joints_is_one_line(robot: Robot):
+    """Six joints and ten recordings whose angles are held within one turn had sixty notes before the verdict."""
+    text = "{}.position jumps by a whole turn {}, first in row {}: unwrapped"
+
+    def said(runs: int, joints: int) -> list[str]:
+        items = []
+        for k in range(runs):
+            found = [
+                Finding("wrapped", text.format(f"j{j}", several(k + 1, "time"), 7 * j), k + 1, joint=f"j{j}")
+                for j in range(1, 1 + joints)
+            ]
+            items.append(replace(moving(robot, f"run_{k}", k), findings=tuple(found)))
+        return [note for note in data_notes(prepare(items)) if "turn" in note]
+
+    first = "j1.position jumps by a whole turn 1 time, first in row 7: unwrapped"
+    assert said(10, 6) == [f"run_0 and 9 more recordings: {first}; so j2, j3, j4 and 2 more; numbers of j1 in run_0"]
+    assert said(1, 6) == [f"run_0: {first}; so j2, j3, j4 and 2 more; numbers of j1 in run_0"]
+    assert said(10, 1) == [f"run_0 and 9 more recordings: {first}; numbers of run_0"]
+    # Few are said with the numbers of each.
+    assert len(said(1, 3)) == 3
 
 
 def test_many_recordings_without_rows_are_left_out_in_one_line(robot: Robot):

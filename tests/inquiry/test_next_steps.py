@@ -35,7 +35,7 @@ def test_what_the_recordings_lack_is_asked_for(lean):
     assert found["the noise floor"].motion == REPEAT
     length = sum(np.ptp(run.time) for run in exact_runs()[::2])
     assert found["the noise floor"].seconds == pytest.approx(length, rel=0.01)
-    assert found["whether the result holds elsewhere"].motion.endswith("give it with --validate")
+    assert found["whether the result holds elsewhere"].motion.endswith("give it with validation")
 
 
 @pytest.mark.parametrize("repeated", [False, True])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import polars as pl
 import pytest
 import yaml
 
@@ -149,3 +150,45 @@ def test_positions_of_joint_states_are_in_si_however_far_they_wind(tmp_path, nam
     urdf = write_urdf(tmp_path / "arm.urdf", (Link("continuous"), Link("continuous")))
     found = inspected(save(tmp_path / "a.csv", made), tmp_path, urdf)
     assert found.mapping["position"]["unit"] == unit
+
+
+def learning_data(position, **more):
+    """Columns as LeRobot writes them."""
+    rows = range(len(MADE["time"]))
+    return {
+        "action": (position + 0.01).tolist(),
+        "observation.environment_state": np.tile(np.sin(MADE["time"]), (7, 1)).T.tolist(),
+        "observation.state": position.tolist(),
+        "timestamp": MADE["time"],
+        "frame_index": list(rows),
+        "episode_index": [0 for _ in rows],
+        **more,
+    }
+
+
+@pytest.mark.parametrize(("factor", "unit"), [(1.0, "rad"), (1.0 / DEGREE, "deg")])
+def test_the_state_of_data_for_learning_is_positions(tmp_path, factor, unit):
+    """No positions were found in observation.state, and what such files lack, the efforts, was not said."""
+    position = np.array([MADE["joint1.position"], MADE["joint2.position"]]).T * factor
+    path = tmp_path / "a.parquet"
+    pl.DataFrame(learning_data(position)).write_parquet(path)
+    found = inspected(path, tmp_path, two_joints(tmp_path))
+    assert found.problems == ()
+    assert found.mapping["time"]["column"] == "timestamp"
+    assert found.mapping["position"] == {"column": "observation.state[{index}]", "unit": unit}
+    assert any("observation.state[{index}] taken as positions" in note for note in found.notes)
+    (lacking,) = (note for note in found.notes if "effort" in note)
+    assert lacking.startswith("no efforts found, so this file cannot be used to identify")
+
+
+def test_a_state_beside_efforts_is_a_recording_and_beside_positions_is_none(tmp_path):
+    position = np.array([MADE["joint1.position"], MADE["joint2.position"]]).T
+    effort = np.array([MADE["joint1.effort"], MADE["joint2.effort"]]).T.tolist()
+    path = tmp_path / "a.parquet"
+    pl.DataFrame(learning_data(position, **{"observation.torque": effort})).write_parquet(path)
+    back = read_back(inspected(path, tmp_path, two_joints(tmp_path)), tmp_path)
+    np.testing.assert_allclose(back.position[0], MADE["joint1.position"], rtol=1e-12)
+    pl.DataFrame(learning_data(0.0 * position, **{"observation.position": position.tolist()})).write_parquet(path)
+    found = inspected(path, tmp_path, two_joints(tmp_path))
+    assert found.mapping["position"]["column"] == "observation.position[{index}]"
+    assert not any("observation.state" in note for note in found.notes)

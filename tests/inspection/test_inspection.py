@@ -100,7 +100,7 @@ def test_measured_files_read_by_the_first_description_as_by_the_published_one(tm
 
 
 def test_how_to_identify_a_joint_that_moves_alone_is_reported(tmp_path):
-    asked = "--joints 'joint1' identifies it alone"
+    asked = "joints='joint1' identifies it alone"
     still = MADE | {"joint2.position": np.asarray(MADE["joint2.position"]) * 1e-6}
     for made, told in ((still, True), (MADE, False)):
         found = inspected(save(tmp_path / "a.parquet", made), tmp_path)

@@ -106,9 +106,9 @@ def test_a_model_to_try_is_reported_where_a_straight_friction_law_leaves_a_curve
     words = " ".join(sentences(found))
     assert found.unexplained is not None
     assert found.unexplained.signals == (f"velocity of {found.unexplained.joint}",)
-    assert "linear in speed: try --model complete" in words
+    assert "linear in speed: try model='complete'" in words
     cubic = " ".join(sentences(diagnose(load_robot(), runs, bands=BANDS, catalogue=())))
-    assert "try --model" not in cubic
+    assert "try model" not in cubic
 
 
 def test_the_rotor_that_a_result_rests_on_is_reported_where_nobody_stated_it(result):

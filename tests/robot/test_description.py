@@ -125,6 +125,18 @@ def test_files_that_are_no_text_are_refused(tmp_path: Path):
     assert "not YAML" in refusal(path)
 
 
+@pytest.mark.parametrize("encoding", ["latin-1", "cp1252"])
+def test_a_letter_of_another_encoding_is_named_with_its_line(tmp_path: Path, encoding: str):
+    """A robot.yaml with an umlaut in a comment, saved in Windows-1252, was said to be no text file."""
+    path = tmp_path / "robot.yaml"
+    path.write_bytes("urdf: a.urdf\n# Größe\n".encode(encoding))
+    assert refusal(path) == (
+        ", line 2: a letter that is not in UTF-8, 'ö' if it is in Windows-1252; save the file in UTF-8"
+    )
+    path.write_bytes("urdf: a.urdf\n# Größe\n".encode("utf-16"))
+    assert refusal(path) == ": not a text file in UTF-8; expected a robot.yaml"
+
+
 def test_a_folder_and_a_missing_file_are_refused(tmp_path: Path):
     assert "is a folder" in refusal(tmp_path)
     assert "no such robot description" in refusal(tmp_path / "robot.yaml")

@@ -139,12 +139,13 @@ def coarse_effort(samples: Samples) -> Checked:
         if not 1 < len(values) <= min(FEW_VALUES, samples.count // 10):
             continue
         torque = float(np.min(np.diff(values))) * abs(samples.robot.effort_gain[joint])
+        name = samples.robot.joints[joint]
         said = (
-            f"{samples.robot.joints[joint]}.effort takes {len(values)} values only, {torque:.3g} "
+            f"{name}.effort takes {len(values)} values only, {torque:.3g} "
             f"{samples.robot.torque_unit(joint)} apart: the rounding error repeats with the motion and may look like "
             f"an effect; record it with a finer resolution"
         )
-        found.append(Finding("coarse_effort", said, samples.count))
+        found.append(Finding("coarse_effort", said, samples.count, joint=name))
     return samples, found
 
 

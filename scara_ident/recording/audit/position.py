@@ -167,7 +167,7 @@ def whole_turns(samples: Samples) -> Checked:
             f"{samples.robot.joints[joint]}.position jumps by a whole turn {several(count, 'time')}, "
             f"first in {samples.where(first)}: unwrapped"
         )
-        found.append(Finding("wrapped", said, count))
+        found.append(Finding("wrapped", said, count, joint=samples.robot.joints[joint]))
     if not found:
         return samples, []
     position = samples.position.copy()
@@ -239,7 +239,7 @@ def limits(samples: Samples) -> Checked:
             f"{robot.joints[joint]}.position reaches {values[index]:.4g} {robot.position_unit(joint)} in "
             f"{samples.where(index)}, beyond the URDF's limit of {limit:.4g}: used as it is"
         )
-        found.append(Finding("limits", said, count))
+        found.append(Finding("limits", said, count, joint=robot.joints[joint]))
     return samples, found
 
 

@@ -45,6 +45,8 @@ class Finding:
         A joint by its place and the torque at which its effort is clipped or stuck, N m or N.
     idle : tuple of int
         Joints by their places that stand still over the whole recording.
+    joint : str or None
+        The joint that the message begins with, where it may be said of others alike and their numbers tell little more.
     """
 
     kind: str
@@ -52,6 +54,7 @@ class Finding:
     count: int = 1
     clipped: tuple[int, float] | None = None
     idle: tuple[int, ...] = ()
+    joint: str | None = None
 
 
 def once(findings: Iterable[Finding]) -> list[Finding]:

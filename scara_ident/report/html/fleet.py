@@ -15,6 +15,7 @@ from scara_ident.files import written_together
 from scara_ident.fleet import Fleet
 from scara_ident.fleet.changes import FALSE_CHANGE_LEVEL
 from scara_ident.fleet.fleet import ArmReport
+from scara_ident.fleet.odd import FALSE_ODD_LEVEL, FEWEST_ARMS
 from scara_ident.manners import several
 from scara_ident.report.html.blocks import (
     Block,
@@ -49,7 +50,7 @@ def _arms(fleet: Fleet) -> list[Block]:
     rows: list[list[Cell | str]] = []
     for item in fleet.ranked:
         dates = () if item.history is None else item.history.dates
-        joined = "; ".join(item.sentences)
+        joined = "; ".join((*item.sentences, *item.oddities))
         surest = min((change.p_value for change in item.changes), default=None)
         rows.append(
             [
@@ -67,9 +68,20 @@ def _arms(fleet: Fleet) -> list[Block]:
         f"An arm is listed if a change is larger than noise: on average a share of {FALSE_CHANGE_LEVEL:g} of the "
         f"listed arms is wrong, and if nothing changed in the fleet the probability that a report lists any arm is "
         f"{FALSE_CHANGE_LEVEL:g}. Noise includes the differences of friction, torque scale, offset and delay from date "
-        f"to date, as estimated from the whole fleet."
+        f"to date, as estimated from the whole fleet. An arm is unlike others if a parameter of its first date lies farther from "
+        f"the median of at least {FEWEST_ARMS} arms, in units of the spread between them, than the farthest of normal arms: in "
+        f"a fleet without odd arms the probability that a report names any is {FALSE_ODD_LEVEL:g}."
     )
-    head = ("arm", "verdict", "what changed", "chance", "diagnosis of the last date", "dates", "last", "faults")
+    head = (
+        "arm",
+        "verdict",
+        "what changed, or is unlike others",
+        "chance",
+        "diagnosis of the last date",
+        "dates",
+        "last",
+        "faults",
+    )
     return [Paragraph(words), Table(head, rows, (3, 5, 7))]
 
 
@@ -185,6 +197,7 @@ def fleet_report(path: Path, fleet: Fleet) -> None:
     changed = [item for item in fleet.ranked if item.changes]
     verdict = [f"{len(changed)} of {several(len(fleet.arms), 'arm')} changed by more than noise."]
     verdict += [f"{item.arm}: {words}." for item in changed for words in item.sentences]
+    verdict += [f"{item.arm}: {words}." for item in fleet.ranked for words in item.oddities]
     if fleet.reservation:
         verdict.append(f"{fleet.reservation}.")
     verdict += [f"{note}." for note in fleet.notes]
@@ -196,7 +209,7 @@ def fleet_report(path: Path, fleet: Fleet) -> None:
         f"{fleet.model.name} model; {several(len(fleet.arms), 'arm')}, {several(dates, 'date')} in all",
         verdict,
         parts("fleet", SECTIONS, fleet),
-        warn=bool(changed or fleet.faults),
+        warn=bool(changed or fleet.faults or any(item.odd for item in fleet.arms)),
     ).write(path)
 
 

@@ -103,7 +103,7 @@ def test_positions_a_little_beyond_the_limits_are_used_and_said(read):
     recording = read(made)
     finding = only(recording, "limits")
     assert "joint2.position reaches 2.35 rad" in finding.message
-    assert "limit of 2.182" in finding.message
+    assert "limit of 2.182" in finding.message and finding.joint == "joint2"
     assert finding.count == np.count_nonzero(made["joint2.position"] > np.radians(125))
     assert len(recording.time) == 4000
 
@@ -115,6 +115,7 @@ def test_an_angle_recorded_within_one_turn_is_unwrapped(read, robot):
     made["joint1.position"] = np.angle(np.exp(1j * truth))
     recording = read(made, endless)
     finding = only(recording, "wrapped")
+    assert finding.joint == "joint1" and finding.message.startswith("joint1.position jumps by a whole turn")
     assert finding.count == np.count_nonzero(np.abs(np.diff(made["joint1.position"])) > 3)
     np.testing.assert_allclose(recording.position[0] - recording.position[0, 0], truth - truth[0], atol=1e-12)
 

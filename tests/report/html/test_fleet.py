@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from scara_ident.errors import ScaraIdentError
+from scara_ident.fleet.odd import Oddity
 from scara_ident.fleet.table import fleet_table
 from scara_ident.report.html.fleet import fleet_report, write_fleet
 from tests.report.html.document import data_of, document
@@ -24,6 +25,20 @@ def test_the_arm_that_changed_comes_first_with_what_and_since_when(fleet_page):
     assert "arm2: Coulomb friction of joint2 up 31 % (± 2 %) since 15 February 2026." in page.words
     assert page.words.index("arm2") < page.words.index("arm1")
     assert "arm2/x.csv: <not> whole" in page.words
+
+
+def test_an_arm_that_is_unlike_others_is_said_to_be_so_behind_what_changed(tmp_path):
+    fleet, odd = made_fleet(), Oddity("a01", "Coulomb friction of joint1", "N m", 1.9, 1.02, 12.4, 8)
+    first, *others = fleet.arms
+    found = replace(fleet, arms=(replace(first, odd=(odd,) * 5), *others))
+    assert [item.arm for item in found.ranked] == ["arm2", "arm1", "arm3"]
+    fleet_report(tmp_path / "report.html", found)
+    words = document(tmp_path / "report.html").words
+    said = "On its first date a01 (Coulomb friction of joint1) is 1.9 N m, 12 standard deviations above the median of 8 arms, 1.02"
+    assert f"arm1: {said}." in words and "arm1: So are 2 more parameters." in words
+    column = fleet_table(found).filter(arm="arm1")["odd"].unique().to_list()
+    assert column == ["; ".join([said] * 3 + ["So are 2 more parameters"])]
+    assert fleet_table(fleet)["odd"].null_count() == len(fleet_table(fleet))
 
 
 def test_notes_on_dates_are_in_the_verdict(tmp_path):
