@@ -150,9 +150,8 @@ def _others(identification: Identification) -> list[str]:
         found.append(
             f"The largest held-out error is on {recording}, {joint}: {rms:.3g} {unit} rms{beside}, {share:.1%} of the torque."
         )
-        held_out = recorded_range(identification.validation.data)
-        known = recorded_range(identification.training.data)
-        faster = faster_than_recorded(known, held_out.speed, robot, "The held-out recordings are")
+        fitted, held_out = (recorded_range(each.data) for each in (identification.training, identification.validation))
+        faster = faster_than_recorded(fitted, held_out.speed, robot, "The held-out recordings are")
         found += [faster] if faster else []
     else:
         found.append(
