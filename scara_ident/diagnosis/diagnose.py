@@ -360,7 +360,7 @@ def _remarks(outcome: Outcome, parameters: PhysicalParameters) -> list[str]:
         criteria = found.step.criteria
         notes.append(
             f"{left.joint}: what repeats with the motor's angle is looked for from {criteria.lowest_order:g} to "
-            f"{criteria.highest_order:g} periods per motor turn; the rest may lie outside this range, such as once per turn of the gear's output"
+            f"{criteria.highest_order:g} periods per motor turn; the rest may lie outside this range, such as once per tooth of the gear's last stage"
         )
     if after.variation is not None:
         notes += after.variation.sentences(robot, None if left is None else left.joint)

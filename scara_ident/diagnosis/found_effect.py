@@ -70,10 +70,10 @@ class FoundEffect:
         return self.effect if self.joint is None else f"{self.effect} on {self.joint}"
 
     def confounder_names(self, scene: Scene) -> tuple[str, ...]:
-        """Return the labels of `confounded_with`, and beside one that is its own what that member is."""
+        """Return the labels of `confounded_with`, and beside its own, and that of a line that may have any period, what that member is."""
         return tuple(
             f"{item.label} ({item.candidate.effect.description(scene, item.candidate.member)})"
-            if item.label == self.label
+            if item.label == self.label or item.candidate.effect.seeded_by is not None
             else item.label
             for item in self.confounded_with
         )

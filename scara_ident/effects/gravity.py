@@ -58,6 +58,19 @@ def sideways(robot: Robot) -> tuple[tuple[str, Array], tuple[str, Array]]:
 
 
 @lru_cache(maxsize=8)
+def loaded_by_gravity(robot: Robot) -> tuple[bool, ...]:
+    """Return which revolute joints gravity loads, from the motion of masses alone."""
+    from scara_ident.model.base_parameters import standard_regressor
+
+    rng = np.random.default_rng(0)
+    q = np.where(robot.prismatic, 0.3, np.pi)[:, None] * rng.uniform(-1.0, 1.0, (robot.n, 20))
+    rest = np.zeros_like(q)
+    torque = np.abs(standard_regressor(robot, q, rest, rest)).max(axis=(1, 2))
+    largest = float(torque.max(initial=0.0))
+    return tuple(bool(largest > 0.0 and torque[j] > 1e-4 * largest and not robot.prismatic[j]) for j in range(robot.n))
+
+
+@lru_cache(maxsize=8)
 def _kernels(robot: Robot) -> tuple[RegressorKernel, RegressorKernel]:
     """Return the kernels of the torque that gravity along minus each of `sideways` gives the `first_moments`."""
     columns = pinocchio_columns(robot, first_moments(robot))

@@ -11,6 +11,7 @@ import numpy as np
 
 from scara_ident.arrays import Array
 from scara_ident.effects.effect import DOUBT_STDS, Effect
+from scara_ident.effects.gravity import loaded_by_gravity
 from scara_ident.effects.links import point_mass, shared, tool_of
 from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, Parameter, View, deviation
 from scara_ident.effects.periodic import TorqueRipple
@@ -269,7 +270,7 @@ class GravityCounterbalance(Sinusoid):
 
     def joints(self, scene: Scene) -> list[int]:
         """Return the revolute joints that gravity loads."""
-        return [j for j, loaded in enumerate(_loaded_by_gravity(scene.robot)) if loaded]
+        return [j for j, loaded in enumerate(loaded_by_gravity(scene.robot)) if loaded]
 
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
         """Return sine and cosine of the position."""
@@ -366,16 +367,3 @@ def shown_of(robot: Robot, most: int = FREE_COLUMNS, share: float = FREE_COLUMN_
         direction = left[:, k] / size[k]
         left = left - np.outer(direction, direction @ left)
     return tuple(sorted(chosen)) or (0,)
-
-
-@lru_cache(maxsize=8)
-def _loaded_by_gravity(robot: Robot) -> tuple[bool, ...]:
-    """Return which revolute joints gravity loads, from the motion of masses alone."""
-    from scara_ident.model.base_parameters import standard_regressor
-
-    rng = np.random.default_rng(0)
-    q = np.where(robot.prismatic, 0.3, np.pi)[:, None] * rng.uniform(-1.0, 1.0, (robot.n, 20))
-    rest = np.zeros_like(q)
-    torque = np.abs(standard_regressor(robot, q, rest, rest)).max(axis=(1, 2))
-    largest = float(torque.max(initial=0.0))
-    return tuple(bool(largest > 0.0 and torque[j] > 1e-4 * largest and not robot.prismatic[j]) for j in range(robot.n))

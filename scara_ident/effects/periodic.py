@@ -12,6 +12,7 @@ from scara_ident.arrays import Array
 from scara_ident.effects.effect import DOUBT_STDS
 from scara_ident.effects.following import EstimateSlopes
 from scara_ident.effects.friction import friction_places, friction_slope
+from scara_ident.effects.gravity import loaded_by_gravity
 from scara_ident.effects.links import behind, rigid_slopes
 from scara_ident.effects.parameters import Member, NonlinearParameter, Parameter, SpectralLine, View
 from scara_ident.effects.signals import Scene, Signals
@@ -21,6 +22,8 @@ from scara_ident.model.terms import Column, joint_rows
 
 # Orders that gears and motors have; others are found in the residual's spectrum.
 ORDERS = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 12.0)
+# Orders per turn of the joint that what is behind its gear has: a wheel or bearing out of centre, oval, or held at three points.
+OUTPUT_ORDERS = (1.0, 2.0, 3.0)
 # Orders of an encoder's error: an eccentric disc has one period per turn, an oval one two.
 ENCODER_ORDERS = (1.0, 2.0)
 # Periods that the travel, or the longest recording, must hold for sine and cosine to be distinguished from a slope.
@@ -37,12 +40,20 @@ LARGEST_ECCENTRICITY = 0.1
 
 
 class PerMotorTurn(Sinusoid):
-    """What repeats with the motor's angle, ``order`` times per turn."""
+    """What repeats with the motor's angle, ``order`` times per turn.
 
-    nonlinear = (NonlinearParameter("order", "1 / motor turn", 0.05, 1000.0, False),)
+    Attributes
+    ----------
+    orders, output_orders : tuple of float
+        Those tried, per turn of the motor and of the joint that it moves.
+    """
+
+    # From once per turn of a joint behind the largest gears.
+    nonlinear = (NonlinearParameter("order", "1 / motor turn", 0.001, 1000.0, False),)
     seeded_by = "order"
     view = View("order")
     orders: ClassVar[tuple[float, ...]] = ORDERS
+    output_orders: ClassVar[tuple[float, ...]] = ()
 
     def joints(self, scene: Scene) -> list[int]:
         """Return the joints of which it is known what a turn is: of a slide without a reduction it would be 2 pi metres."""
@@ -69,11 +80,24 @@ class PerMotorTurn(Sinusoid):
     def description(self, scene: Scene, member: Member) -> str:
         """Return the description, in the singular for one period, with whose turn it is where no gear is known."""
         said = super().description(scene, member).replace(" 1 periods ", " 1 period ")
-        return f"{said} (a turn of the joint: its reduction is 1)" if _gearless(scene, member) else said
+        if _gearless(scene, member):
+            return f"{said} (a turn of the joint: its reduction is 1)"
+        per_turn = member.nonlinear[0] * abs(float(scene.robot.reduction[member.place]))
+        slow = per_turn < max(self.output_orders, default=0.0) + 1.0 and not scene.robot.prismatic[member.place]
+        return f"{said} ({per_turn:.3g} per turn of the joint)" if slow else said
 
     def _in_band(self, scene: Scene, joint: int) -> Iterable[float]:
-        turns_per_second = abs(float(scene.robot.reduction[joint])) * float(scene.speed[joint]) / (2.0 * np.pi)
-        return (x for x in self.orders if SLOW_SHARE * x * turns_per_second <= scene.band)
+        motor_turns = abs(float(scene.robot.reduction[joint]))
+        turns_per_second = motor_turns * float(scene.speed[joint]) / (2.0 * np.pi)
+        orders = dict.fromkeys((*self.orders, *(x / motor_turns for x in self._behind_gear(scene, joint))))
+        return (x for x in orders if SLOW_SHARE * x * turns_per_second <= scene.band)
+
+    def _behind_gear(self, scene: Scene, joint: int) -> tuple[float, ...]:
+        """Return the orders per turn of the joint; once per turn is a counterbalance, or gravity itself, where gravity loads it."""
+        if scene.robot.prismatic[joint]:
+            return ()
+        loaded = loaded_by_gravity(scene.robot)[joint]
+        return tuple(x for x in self.output_orders if x != 1.0 or not loaded)
 
     def resolution(self, scene: Scene, member: Member) -> tuple[float, ...]:
         """Return one over the motor turns covered."""
@@ -92,7 +116,8 @@ class TorqueRipple(PerMotorTurn):
     watched = True
     coefficients = sine_and_cosine("ripple_{part}", "{part} of {order:g} times the motor's angle of {joint}")
     of_state = True
-    experiment = "move slowly at constant speed over several motor turns, and record at a high rate"
+    experiment = "move slowly at constant speed over several of its periods, and record at a high rate"
+    output_orders = OUTPUT_ORDERS
 
     def description(self, scene: Scene, member: Member) -> str:
         """Say behind which reduction periods would be a whole number: one that is not is often stated wrong."""

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scara_ident.effects.gravity import first_moments, gravity_columns, gravity_torque, sideways
+from scara_ident.effects.gravity import first_moments, gravity_columns, gravity_torque, loaded_by_gravity, sideways
 from scara_ident.robot.robot import Robot, load_robot
 from tests.arms import example_urdf, rnea
 from tests.effects.scenes import moving
@@ -72,3 +72,8 @@ def test_torque_of_some_moments_is_the_sum_of_their_columns() -> None:
     for axis, (_, direction) in enumerate(sideways(robot)):
         expected = np.einsum("jkn,k->jn", gravity_columns(robot, axis, q), moments)
         assert gravity_torque(robot, q, -9.81 * direction, moments) == pytest.approx(expected, abs=1e-9)
+
+
+def test_gravity_loads_joints_whose_axis_is_not_upright() -> None:
+    assert loaded_by_gravity(load_robot()) == (False, False)
+    assert loaded_by_gravity(load_robot(example_urdf("ur5_robot.urdf"))) == (False, True, True, True, True, True)

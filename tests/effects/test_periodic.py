@@ -16,7 +16,7 @@ from scara_ident.motion.motion import Motion
 from scara_ident.robot.robot import load_robot
 from scara_ident.simulation import effects as fx
 from scara_ident.simulation import simulate, virtual_arm
-from tests.arms import Link, write_urdf
+from tests.arms import PLANAR_2R, Link, write_urdf
 from tests.effects.scenes import columns, fit, moving, scene_of, wandering
 from tests.effects.simulated import ARMS, arm_of, run, true_motion, true_scene
 from tests.simulation.made import left_over
@@ -81,11 +81,43 @@ def test_orders_of_which_the_travel_holds_too_few_periods_are_doubtful():
     assert TorqueRipple().members(scene) == tuple(
         Member(j, (x,)) for j, orders in ((0, (8.0, 12.0)), (1, ORDERS)) for x in orders
     )
-    assert TorqueRipple().doubtful(scene) == tuple(Member(0, (x,)) for x in (1.0, 2.0, 3.0, 4.0, 5.0, 6.0))
+    few = tuple(Member(0, (x,)) for x in (1.0, 2.0, 3.0, 4.0, 5.0, 6.0))
+    # Two radians hold less than a turn of what is behind a gear.
+    behind = tuple(Member(1, (x,)) for x in (0.01, 0.02, 0.03))
+    assert TorqueRipple().doubtful(scene) == few + behind
     assert EncoderEccentricity().doubtful(scene) == (Member(0, (1.0,)), Member(0, (2.0,)))
     fast = replace(scene, speed=np.array([2.0, 2.0]) * 200.0)
-    assert TorqueRipple().doubtful(fast) == tuple(Member(0, (x,)) for x in (1.0, 2.0, 3.0, 4.0, 5.0, 6.0))
+    assert TorqueRipple().doubtful(fast) == few + behind
     assert len(TorqueRipple().members(fast)) < len(TorqueRipple().members(scene))
+
+
+def test_what_is_behind_a_gear_is_tried_where_the_travel_holds_two_periods(tmp_path: Path):
+    """A shoulder with two periods per turn was a spring, as nothing slower than 0.4 periods per motor turn was tried."""
+    scene = scene_of(replace(load_robot(), reduction=np.array([-100.0, 80.0])))
+    slow = {item for item in TorqueRipple().doubtful(scene) if item.nonlinear[0] < 0.1}
+    assert slow == {Member(0, (x / 100.0,)) for x in (1.0, 2.0, 3.0)} | {
+        Member(1, (x / 80.0,)) for x in (1.0, 2.0, 3.0)
+    }
+    wide = replace(scene, travel=np.array([5.0, 7.0]))
+    tried = {item for item in TorqueRipple().members(wide) if item.nonlinear[0] < 0.1}
+    assert tried == {Member(0, (0.03,)), Member(1, (2.0 / 80.0,)), Member(1, (3.0 / 80.0,))}
+    assert slow - tried == {item for item in TorqueRipple().doubtful(wide) if item.nonlinear[0] < 0.1}
+    for item in slow:
+        ((lower, upper),) = TorqueRipple().limits(scene, item)
+        assert lower < item.nonlinear[0] < upper
+    assert all(item.nonlinear[0] >= 1.0 for item in EncoderEccentricity().doubtful(scene))
+    # Once per turn is what balances a joint, or gravity itself, where gravity loads it.
+    loaded = scene_of(load_robot(write_urdf(tmp_path / "arm.urdf", PLANAR_2R, [50.0, 50.0])))
+    assert {item.nonlinear[0] for item in TorqueRipple().doubtful(loaded)} == {0.04, 0.06}
+
+
+@pytest.mark.parametrize(
+    ("order", "reduction", "said"),
+    [(0.02, 100.0, "0.02 periods per motor turn (2 per turn of the joint)"), (0.0125, -80.0, "0.0125 periods per motor turn (1 per turn of the joint)"), (1.0, 100.0, "1 period per motor turn")],
+)  # fmt: skip
+def test_what_is_behind_a_gear_is_said_per_turn_of_the_joint(order: float, reduction: float, said: str):
+    scene = scene_of(replace(load_robot(), reduction=np.array([reduction, 50.0])))
+    assert TorqueRipple().description(scene, Member(0, (order,))) == f"a torque ripple of {said}"
 
 
 def test_lines_that_alias_into_a_band_are_left_out():
@@ -205,3 +237,4 @@ def test_a_slide_turns_no_motor_unless_its_reduction_is_stated(tmp_path: Path, r
     line = SpectralLine("order", 3.0)
     for effect in (TorqueRipple(), EncoderEccentricity()):
         assert bool(effect.members(scene)) == bool(effect.seeds(scene, 0, line)) == (reduction != 1.0)
+        assert all(item.nonlinear[0] >= 1.0 for item in (*effect.members(scene), *effect.doubtful(scene)))

@@ -17,6 +17,7 @@ from scara_ident.diagnosis.selection.tentative import TentativeEffect
 from scara_ident.effects import Parameter
 from scara_ident.effects.parameters import Member
 from scara_ident.effects.payload import FreePayloadChange, PayloadOfRecordings
+from scara_ident.effects.periodic import TorqueRipple
 from scara_ident.effects.position import Spring
 from scara_ident.estimation.run_offsets import rms_of
 from scara_ident.inquiry.next_steps import next_steps
@@ -199,12 +200,13 @@ def test_what_is_unexplained_is_said_to_go_as_an_effect_that_no_arm_has():
 
 def test_a_confounder_of_its_own_name_is_distinguished_from_it(result):
     """A payload of one recording could not be told, it said, from payload_change."""
-    carried, taken_up, spring = PayloadOfRecordings(), FreePayloadChange(), Spring()
+    carried, taken_up, spring, ripple = PayloadOfRecordings(), FreePayloadChange(), Spring(), TorqueRipple()
     rivals = tuple(
         Confounder(label, family.name, joint, 0.8, Candidate(family, member), (1.0,))
         for label, family, joint, member in (
             ("payload_change", taken_up, None, Member(None, (3.0,))),
             ("spring of joint2", spring, "joint2", Member(1)),
+            ("torque_ripple of joint2", ripple, "joint2", Member(1, (0.02,))),
         )
     )
     found = replace(
@@ -213,6 +215,8 @@ def test_a_confounder_of_its_own_name_is_distinguished_from_it(result):
     assert found.confounder_names(result.search.scene) == (
         "payload_change (a payload at an unknown place, picked up or put down during a run)",
         "spring of joint2",
+        # Of which only its period says whether it is the motor's.
+        f"torque_ripple of joint2 ({ripple.description(result.search.scene, Member(1, (0.02,)))})",
     )
     said = " ".join(sentences(replace(result, effects=(found,))))
     assert "cannot distinguish it from: payload_change (a payload at an unknown place" in said

@@ -250,20 +250,36 @@ def test_an_effect_beside_it_stays():
     assert superfluous(found, found.step.weights, others) == []
 
 
+RIPPLE = "a torque ripple of "
+
+
 @pytest.mark.slow
-def test_a_ripple_of_too_few_periods_is_reported_and_not_believed():
-    # Once per turn of a joint whose gear is not known, of which the motion has 0.6 turns: a spring takes its place.
-    robot = replace(load_robot(), reduction=np.ones(2))
+@pytest.mark.parametrize(
+    ("reduction", "ripple"),
+    [(1.0, f"{RIPPLE}1 period per motor turn (a turn of the joint: its reduction is 1)"), (100.0, f"{RIPPLE}0.01 periods per motor turn (1 per turn of the joint)")],
+)  # fmt: skip
+def test_a_ripple_of_too_few_periods_is_reported_and_not_believed(reduction: float, ripple: str):
+    # Once per turn of a joint, whether its gear is known or not, of which the motion has 0.6 turns: a spring takes its place.
+    robot = replace(load_robot(), reduction=np.full(2, reduction))
     made = with_torque(exact_runs(), 0, lambda motion: 0.3 * np.sin(motion.q[0] - 1.57))
     result = diagnose(robot, made, bands=BANDS, catalogue=(Spring(), TorqueRipple()))
     assert result.effects == () and result.verdict == "unexplained"
     assert [item.joint for item in result.evidence if "excite it too little" in item.why] == ["joint1"]
     told = {item.effect: item.why for item in result.tentative}
     assert set(told) == {"torque_ripple", "spring"}
-    ripple = "a torque ripple of 1 period per motor turn (a turn of the joint: its reduction is 1)"
     assert told["spring"].startswith(f"{ripple} explains more in its place")
     straight = diagnose(robot, with_torque(exact_runs(), 0, spring), bands=BANDS, catalogue=(Spring(), TorqueRipple()))
     assert [(item.effect, item.confounded_with) for item in straight.effects] == [("spring", ())]
+
+
+def test_a_ripple_behind_a_gear_is_found_over_two_periods_and_stands_for_no_spring():
+    for torque, name, order in (
+        (lambda motion: 0.1 * np.sin(3.0 * motion.q[0] + 0.5), "torque_ripple of joint1", (0.03,)),
+        (spring, "spring of joint1", ()),
+    ):
+        found = searched(with_torque(exact_runs(size=3.6), 0, torque), Spring(), TorqueRipple())
+        assert [item.label(found.scene) for item in found.chosen] == [name]
+        assert found.chosen[0].member.nonlinear == pytest.approx(order, rel=0.01)
 
 
 def test_what_one_motion_repeats_is_no_effect():
