@@ -277,15 +277,14 @@ class TwoMasses:
         columns = [np.flatnonzero(term.pattern[joint]) for joint in own] if carrier else []
         acting = np.flatnonzero(np.any((rotors != 0.0) | (usual != 0.0), axis=0))
         acting = np.unique(np.concatenate([acting, *columns, [p + 1, p + 2]]))
-        # Torques that the parameters put into the gears, and directly into the joints' torque.
+        # Torques that the parameters put into the gears, and by rotors, which few have, directly into the joints' torque.
         turning, ratio = self._turning, self._ratio
-        right, direct = np.zeros((2, len(acting), len(own), motion.samples))
+        right = np.zeros((len(acting), len(own), motion.samples))
         for a, joint in enumerate(own):
             turned, held = rotors[a, acting, None], usual[a, acting, None]
             right[:, a] = -turned * moved.a[joint] - held * (
                 turning[a] ** 2 * x[a] + 2.0 * ratio[a] * turning[a] * first[a]
             )
-            direct[:, a] = self._scale[a] * turned * second[a]
             if carrier:
                 at = np.searchsorted(acting, columns[a])
                 right[at, a] += bodies[joint] / self._scale[a]
@@ -293,6 +292,9 @@ class TwoMasses:
         right[-2, place] = -4.0 * np.pi * inertia * (turning[place] * x[place] + ratio[place] * first[place])
         right[-1, place] = -2.0 * turning[place] * inertia * first[place]
         lags = self._settled(swing, right)
+        # As large as each of them.
+        del right
+        direct = self._scale[:, None] * rotors[:, acting]
         each = [(lags[0][:, a], lags[1][:, a], lags[2][:, a]) for a in range(len(own))]
         about = [link_slopes(links, joint) for joint in own]
         count, state = 0, np.zeros((0, 0))
@@ -300,7 +302,7 @@ class TwoMasses:
             # The swing at the beginning is fitted again whatever the parameters are.
             count = self._initial.count
             whole = self._on_own((lags[0][..., :count], lags[1][..., :count], lags[2][..., :count]), links)
-            whole += direct[..., :count]
+            whole += direct.T[..., None] * second[:, :count]
             for a, at in enumerate(columns):
                 whole[np.searchsorted(acting, at), a] += bodies[own[a]][:, :count]
             state = self._initial.state(whole, (x, first))
@@ -313,7 +315,9 @@ class TwoMasses:
             if carrier:
                 result[np.searchsorted(places, body)] += bodies[joint] - rigid_rows(self.signals)[joint]
             if joint in own:
-                result[at] += direct[:, own.index(joint)]
+                a = own.index(joint)
+                by_rotor = np.flatnonzero(direct[a])
+                result[at[by_rotor]] += direct[a, by_rotor, None] * second[a]
             if count:
                 result[at, :count] -= state @ self._begun[:, joint]
             result[np.searchsorted(places, shared_out)] += share[shared_out, None] * self.parts[place][joint]
