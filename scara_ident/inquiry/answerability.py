@@ -369,9 +369,7 @@ def inquiry_of(content: Mapping[str, Any], robot: Robot, recordings: Sequence[Re
     """
     try:
         if content["robot"] != robot.name:
-            raise ScaraIdentError(
-                f"diagnosis of {content['robot']}, but the robot is {robot.name}; give the diagnosis's robot"
-            )
+            raise ScaraIdentError(f"diagnosis of {content['robot']}, but the robot is {robot.name}; give its robot")
         model = build_model(robot, content["model"])
         value = np.array([row["value"] for row in content["parameters"]][: len(model.columns)], dtype=float)
         asked = tuple(question_of(item) for item in content["next"] if item.get("kind"))
