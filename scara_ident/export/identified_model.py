@@ -16,6 +16,7 @@ from scara_ident.effects import EffectTerm
 from scara_ident.estimation.consistent.estimator import ConsistentEstimate
 from scara_ident.estimation.estimate import joint_errors
 from scara_ident.estimation.information import Information, weighted
+from scara_ident.estimation.observations import Observations
 from scara_ident.identification.identify import Identification
 from scara_ident.model.model import TorqueModel
 from scara_ident.model.terms import Friction
@@ -204,8 +205,13 @@ def identified_model(found: Identification | Diagnosis) -> IdentifiedModel:
         bands=tuple(bands),
         rms=np.array([np.nan if error is None else error.rms_unfiltered for error in errors]),
         found=entries,
-        reached=recorded_range(fitted.data),
+        reached=reached_by(fitted),
     )
+
+
+def reached_by(observations: Observations) -> RecordedRange | None:
+    """Return the range of recordings; None of files so long that a part of them alone is held."""
+    return recorded_range(observations.data) if observations.kept is None else None
 
 
 def _labels(term: Any) -> list[str]:

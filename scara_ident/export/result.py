@@ -126,8 +126,8 @@ def _model_of(
         bands=tuple(bands.get(joint) for joint in arm.joints),
         rms=_rms(content, arm.joints),
         found=tuple(content.get("effects", ())),
-        # Results of earlier versions have none.
-        reached=range_of_entry(content["range"], arm) if "range" in content else None,
+        # Results of earlier versions, and of files read in parts, have none.
+        reached=range_of_entry(content["range"], arm) if content.get("range") else None,
     )
 
 

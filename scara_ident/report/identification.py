@@ -20,6 +20,7 @@ from scara_ident.estimation.run_variation import MIN_RUNS
 from scara_ident.estimation.saved import estimate_dict
 from scara_ident.estimation.urdf_scale import scale_sentence, urdf_scale
 from scara_ident.estimation.urdf_weight import rotor_sentence, scale_in_words
+from scara_ident.export.identified_model import reached_by
 from scara_ident.export.result import KEY, rebuild_entry
 from scara_ident.identification.identify import (
     Identification,
@@ -55,6 +56,7 @@ def identification_dict(identification: Identification) -> dict[str, Any]:
     possible = identification.physical_consistency
     nominal = urdf_values(identification.model)
     first, others = headline_and_details(identification)
+    reached = reached_by(identification.training)
     content: dict[str, Any] = {
         "robot": robot.name,
         "model": identification.model.name,
@@ -77,7 +79,7 @@ def identification_dict(identification: Identification) -> dict[str, Any]:
         "contradictions": list(possible.reasons),
         "distance_to_possible_std": possible.distance_std,
         "band_hz": robot.by_joint(identification.bands),
-        "range": recorded_range(identification.training.data).entry(robot),
+        "range": None if reached is None else reached.entry(robot),
         "errors": {
             "training": _errors(robot, identification.training_errors()),
             "validation": _errors(robot, identification.validation_errors()),
@@ -150,8 +152,10 @@ def _others(identification: Identification) -> list[str]:
         found.append(
             f"The largest held-out error is on {recording}, {joint}: {rms:.3g} {unit} rms{beside}, {share:.1%} of the torque."
         )
-        fitted, held_out = (recorded_range(each.data) for each in (identification.training, identification.validation))
-        faster = faster_than_recorded(fitted, held_out.speed, robot, "The held-out recordings are")
+        held_out = recorded_range(identification.validation.data)
+        faster = faster_than_recorded(
+            reached_by(identification.training), held_out.speed, robot, "The held-out recordings are"
+        )
         found += [faster] if faster else []
     else:
         found.append(

@@ -9,11 +9,13 @@ import numpy as np
 import pytest
 
 from scara_ident.errors import RecordingError
+from scara_ident.export.identified_model import identified_model
 from scara_ident.identification import long_recordings
 from scara_ident.identification.binned_residual import BIN
 from scara_ident.identification.identify import Identification, identify
 from scara_ident.recording import long_file
 from scara_ident.recording.recording import Recording, read_recording, write_recording
+from scara_ident.report.identification import identification_dict
 from scara_ident.robot.robot import load_robot
 from tests.arms import PLANAR_2R, noisy, swing, write_urdf
 from tests.truth.pushes import pushed
@@ -71,6 +73,14 @@ def test_parts_say_what_the_whole_says(run, tmp_path, monkeypatch, method):
 
 
 @pytest.mark.slow
+def test_of_a_file_read_in_parts_no_range_is_stated_for_only_a_part_is_held(run, tmp_path, monkeypatch):
+    long = in_parts(monkeypatch, written(tmp_path, run))
+    for recording, stated in ((long, False), (run, True)):
+        found = identify(ROBOT, [recording], bands=BANDS)
+        assert (identification_dict(found)["range"] is not None) == stated
+        assert (identified_model(found).reached is not None) == stated
+
+
 def test_bands_chosen_and_events_found_are_those_of_the_whole_beside_another_recording(run, tmp_path, monkeypatch):
     path = written(tmp_path, pushed(ROBOT, run, np.array([12.0, -9.0, 0.0]), 43.0, 44.2))
     other = noisy(swing(ROBOT, "other", seed=3, rate=250.0), np.random.default_rng(1), 0.01)
