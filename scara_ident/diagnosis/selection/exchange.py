@@ -10,6 +10,8 @@ import numpy as np
 
 from scara_ident.diagnosis.candidates.candidates import Candidate
 from scara_ident.diagnosis.checks.same_errors import ROUNDING, same
+from scara_ident.diagnosis.fitting.interval_fit import refined
+from scara_ident.diagnosis.fitting.nonlinear_fit import tune
 from scara_ident.diagnosis.selection.choice import fitted_beside, fitted_with, objection
 from scara_ident.diagnosis.testing.acceptance import Decision
 from scara_ident.diagnosis.testing.candidate_tests import held_out_gains
@@ -18,6 +20,8 @@ from scara_ident.effects import Scene
 
 # Columns at the base model's estimate have at least this share of the gain that columns at the last estimate have.
 MIN_PRELIMINARY_SHARE = 0.5
+# Why an effect that is dropped and would come in again, once the others are fitted without it, is not believed.
+DROPPED = "it was found, and beside the others as fitted with it it was no longer accepted"
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +90,19 @@ def needed(step: SelectionStep) -> tuple[Candidate, ...]:
             break
         step = step.without(weakest)
     return step.chosen
+
+
+def without_superfluous(step: SelectionStep) -> tuple[SelectionStep, list[Decision]]:
+    """Return the step with the effects that are still needed, all fitted together, and the decisions on the others beside them.
+
+    Whether an effect is needed is asked with all parameters fitted together: a coarse fit of one effect may hide another.
+    """
+    fitted = tune(step)
+    kept = needed(fitted)
+    gone = [item for item in fitted.chosen if item not in kept]
+    end = refined(tune(replace(fitted, chosen=kept)) if gone else fitted)
+    judged = end.judge(gone) if gone else []
+    return end, [item.refused(DROPPED) if item.accepted else item for item in judged]
 
 
 def near_in_place(step: SelectionStep, found: Decision, pool: Sequence[Candidate], first: Scene) -> list[Decision]:

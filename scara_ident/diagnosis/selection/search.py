@@ -14,10 +14,9 @@ from scara_ident.diagnosis.candidates.lines import line_candidates
 from scara_ident.diagnosis.candidates.not_finite import without_not_finite
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
 from scara_ident.diagnosis.fitting.correction import Correction
-from scara_ident.diagnosis.fitting.interval_fit import refined
 from scara_ident.diagnosis.fitting.nonlinear_fit import tune
 from scara_ident.diagnosis.selection.choice import choose
-from scara_ident.diagnosis.selection.exchange import best_exchange, needed
+from scara_ident.diagnosis.selection.exchange import best_exchange, without_superfluous
 from scara_ident.diagnosis.selection.search_state import SearchState, Step
 from scara_ident.diagnosis.testing.acceptance import Decision
 from scara_ident.diagnosis.testing.selection_step import SelectionStep, best_of_each, model_with
@@ -281,7 +280,8 @@ def _searched(
     if state.correction is not None:
         # Effects accepted since then had changed it.
         state = state.corrected(state.correction.candidate)
-    step = refined(tune(replace(state.step, chosen=needed(state.step))))
+    step, dropped = without_superfluous(state.step)
+    decisions += dropped
     labels = {item.label(step.scene) for item in step.chosen}
     stayed = [item for item in state.steps if item.decision.label in labels or item.decision.candidate.corrects_data]
     others = [Candidate(effect, member) for effect in task.catalogue for member in effect.doubtful(base.first)]

@@ -9,7 +9,7 @@ import pytest
 
 from scara_ident.diagnosis.candidates.candidates import Candidate
 from scara_ident.diagnosis.checks.same_errors import same
-from scara_ident.diagnosis.selection.exchange import best_exchange, near_in_place, needed
+from scara_ident.diagnosis.selection.exchange import best_exchange, near_in_place, needed, without_superfluous
 from scara_ident.effects import Member
 from scara_ident.effects.friction import AsymmetricFriction, Stribeck
 from scara_ident.effects.measurement import TimeDelay
@@ -94,6 +94,40 @@ def test_an_effect_that_the_others_make_superfluous_is_dropped(runs):
     """Backwards every effect is judged beside the others; one that nothing was planted for does not stay."""
     extra = Candidate(Stribeck(), Member(0, (0.5,)))
     assert needed(step_beside(runs, (SPRING, extra, ASYMMETRIC))) == (SPRING, ASYMMETRIC)
+
+
+def test_whether_an_effect_is_needed_is_asked_as_it_is_fitted_with_all_others():
+    """A gear loss beside a bent torque sensor was let in, and dropped before both were fitted together."""
+    runs = with_torque(exact_runs(), 1, lambda motion: 0.05 * motion.q[1])
+    runs = with_torque(runs, 0, lambda motion: 0.2 * np.exp(-(((motion.q[0] - 1.15) / 0.3) ** 2)))
+    spring = Candidate(Spring(), Member(1))
+    coarse = step_beside(runs, (spring, Candidate(Bump(), Member(0, (1.5,)))))
+    assert needed(coarse) == (spring,)
+    step, dropped = without_superfluous(coarse)
+    assert (step.chosen[0], dropped) == (spring, [])
+    # The noise moves the bump by less than this.
+    assert step.chosen[1].member.nonlinear[0] == pytest.approx(1.15, abs=0.01)
+
+
+def test_an_effect_that_is_dropped_at_the_end_is_tentative_if_the_model_lacks_it(runs):
+    """A clearance that helped in 5 of 7 recordings beside another effect was let in and dropped, and nothing said so."""
+    step = step_beside(runs, (SPRING, ASYMMETRIC))
+    end, dropped = without_superfluous(step)
+    assert (end.chosen, dropped) == ((SPRING, ASYMMETRIC), [])
+    # With more votes asked than there are none is accepted: the weakest goes, and the last one stays.
+    asked = replace(step, criteria=replace(step.criteria, min_votes=2.0, dominant=2.0))
+    end, (gone,) = without_superfluous(asked)
+    assert {gone.candidate, *end.chosen} == {SPRING, ASYMMETRIC}
+    assert gone.tentative and not gone.accepted
+    assert "it helps in only" in gone.why
+
+
+def test_what_the_others_make_superfluous_is_not_tentative(runs):
+    extra = Candidate(Stribeck(), Member(0, (0.5,)))
+    end, (gone,) = without_superfluous(step_beside(runs, (SPRING, extra, ASYMMETRIC)))
+    assert end.chosen == (SPRING, ASYMMETRIC)
+    assert gone.candidate.effect == extra.effect
+    assert not (gone.tentative or gone.accepted)
 
 
 class Shape(Spring):
