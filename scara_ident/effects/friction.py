@@ -70,10 +70,15 @@ def not_all_of_coulomb(
     coulomb = friction_of(scene, joint).get(0)
     if coulomb is None:
         return None
+    # Directly after a reversal all dry friction builds up, that of low speed too.
+    slow = sum(
+        item.value[0] for item in scene.beside if isinstance(item.effect, Stribeck) and item.member.place == joint
+    )
     if value[0] + DOUBT_STDS * std[0] < smallest * max(coulomb, 0.0):
         return f"only a small part of the Coulomb friction would build up {builds_up}, but all of it must"
-    if value[0] - DOUBT_STDS * std[0] > largest * max(coulomb, 0.0):
-        return f"it would be more than {largest:g} times the Coulomb friction"
+    if value[0] - DOUBT_STDS * std[0] > largest * (max(coulomb, 0.0) + max(slow, 0.0)):
+        beside = " and that at low speed" if slow > 0.0 else ""
+        return f"it would be more than {largest:g} times the Coulomb friction{beside}"
     return None
 
 

@@ -29,7 +29,7 @@ DERIVATIVE_BAND = 3.0
 
 @dataclass(frozen=True)
 class LinkTorque:
-    """An effect in a model whose torque acts on links, with its coefficients, shape (k,), as estimated at present."""
+    """An effect in a model, of those on links where a scene holds them, with its coefficients, shape (k,), as estimated at present."""
 
     effect: Effect
     member: Member
@@ -67,6 +67,8 @@ class Scene:
         Of the effects in the model beside the base model, which gears transmit too.
     together : tuple of (Effect, Member)
         Effects in the model whose members act together, see `Effect.together`, in the order of their joints.
+    beside : tuple of LinkTorque
+        All effects in the model, where it is asked whether an arm can have another one beside them.
     """
 
     model: TorqueModel
@@ -81,6 +83,7 @@ class Scene:
     columns: Mapping[Motion, tuple[Array, ...]] = field(default_factory=dict, repr=False)
     link_torques: tuple[LinkTorque, ...] = ()
     together: tuple[tuple[Effect, Member], ...] = ()
+    beside: tuple[LinkTorque, ...] = ()
 
     @property
     def robot(self) -> Robot:

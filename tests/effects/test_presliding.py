@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from scara_ident.effects import Member
+from scara_ident.effects.friction import Stribeck
 from scara_ident.effects.presliding import (
     DISTANCES,
     SLIDE_DISTANCES,
@@ -19,6 +20,7 @@ from scara_ident.effects.presliding import (
     dahl_state,
     turning_points,
 )
+from scara_ident.effects.signals import LinkTorque
 from scara_ident.model.model import build_model
 from scara_ident.robot.robot import load_robot
 from scara_ident.simulation import effects as fx
@@ -88,6 +90,25 @@ def test_the_column_is_what_the_simulated_arm_adds(kind: str, tmp_path: Path):
     assert Presliding().inadmissible(scene, Member(0, (0.01,)), np.array([a0]), np.array([0.01 * a0])) is None
     assert Presliding().inadmissible(scene, Member(0, (0.01,)), np.array([2.0 * a0]), np.array([0.01 * a0]))
     assert Presliding().inadmissible(scene, Member(0, (0.01,)), np.array([-a0]), np.array([0.01 * a0]))
+
+
+def test_what_builds_up_is_all_dry_friction_of_the_joint_that_at_low_speed_too():
+    """Of an arm with both the presliding was refused as too much, and then nothing was found (LuGre's model has both)."""
+    scene = scene_of(load_robot())
+    member, a0 = Member(1, (0.01,)), 0.02
+    both, sure = np.array([1.7 * a0]), np.array([0.01 * a0])
+    assert "1.5 times the Coulomb friction" in str(Presliding().inadmissible(scene, member, both, sure))
+
+    def beside(joint: int, amplitude: float):
+        return replace(scene, beside=(LinkTorque(Stribeck(), Member(joint, (0.1,)), (amplitude,)),))
+
+    assert Presliding().inadmissible(beside(1, 0.7 * a0), member, both, sure) is None
+    # Another joint's has nothing to do with it, and less friction at low speed than at others adds none.
+    assert Presliding().inadmissible(beside(0, 0.7 * a0), member, both, sure)
+    assert Presliding().inadmissible(beside(1, -0.7 * a0), member, both, sure)
+    more = Presliding().inadmissible(beside(1, 0.7 * a0), member, 2.0 * both, sure)
+    assert "1.5 times the Coulomb friction and that at low speed" in str(more)
+    assert Presliding().inadmissible(beside(1, 0.7 * a0), member, 0.2 * both, sure)
 
 
 def test_members_are_shorter_than_the_travel():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,6 +12,7 @@ from scara_ident.diagnosis.criteria import SelectionCriteria
 from scara_ident.diagnosis.testing.candidate_tests import Examination
 from scara_ident.effects import Scene
 from scara_ident.effects.effect import DOUBT_STDS
+from scara_ident.effects.signals import LinkTorque
 
 
 @dataclass(frozen=True)
@@ -46,7 +48,13 @@ class Decision:
 
 
 def decide(
-    candidate: Candidate, examination: Examination, gain: float, scene: Scene, tried: int, criteria: SelectionCriteria
+    candidate: Candidate,
+    examination: Examination,
+    gain: float,
+    scene: Scene,
+    tried: int,
+    criteria: SelectionCriteria,
+    chosen: Sequence[Candidate] = (),
 ) -> Decision:
     """Decide on one candidate.
 
@@ -56,9 +64,11 @@ def decide(
         See `gains`.
     tried : int
         Candidates and scan points tried, for the correction of the p-value.
+    chosen : sequence of Candidate
+        Effects that are in the model.
     """
     unseen = _unseen(examination, criteria) or _faint(examination, gain, criteria)
-    of_no_arm = _inadmissible(candidate, examination, scene)
+    of_no_arm = _inadmissible(candidate, examination, scene, chosen)
     impossible = _unseen(examination, criteria) or of_no_arm
     small = impossible or _small(candidate, examination, scene, gain, criteria)
     seldom = _seldom(candidate, examination, gain, criteria)
@@ -97,10 +107,17 @@ def _faint(examination: Examination, gain: float, criteria: SelectionCriteria) -
     )
 
 
-def _inadmissible(candidate: Candidate, examination: Examination, scene: Scene) -> str | None:
+def _inadmissible(
+    candidate: Candidate, examination: Examination, scene: Scene, chosen: Sequence[Candidate] = ()
+) -> str | None:
     std = np.sqrt(np.clip(np.diag(examination.covariance), 0.0, None))
     # Judged with the parameters that the model has with the candidate.
-    after = replace(scene, value=examination.model_value[: len(scene.value)])
+    start, beside = len(scene.value), []
+    for item in chosen:
+        stop = start + len(item.effect.columns(scene, item.member))
+        beside.append(LinkTorque(item.effect, item.member, tuple(examination.model_value[start:stop].tolist())))
+        start = stop
+    after = replace(scene, value=examination.model_value[: len(scene.value)], beside=tuple(beside))
     return candidate.effect.inadmissible(after, candidate.member, examination.value, std)
 
 

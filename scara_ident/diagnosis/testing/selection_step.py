@@ -179,7 +179,7 @@ class SelectionStep:
             if self.in_doubt(result, gain):
                 found[k] = examine_rows(model, rows[k], result)
         decided = [
-            decide(item, result, gain, self.scene, self.tried, self.criteria)
+            decide(item, result, gain, self.scene, self.tried, self.criteria, self.chosen)
             for item, result, gain in zip(candidates, found, gained, strict=True)
         ]
         return [replace(item, why=NOT_FINITE) if self._not_finite(item.candidate, first) else item for item in decided]

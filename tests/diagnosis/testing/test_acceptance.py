@@ -13,6 +13,7 @@ from scara_ident.diagnosis.testing.acceptance import Decision, decide, displacem
 from scara_ident.diagnosis.testing.candidate_tests import Examination
 from scara_ident.effects import Member
 from scara_ident.effects.elasticity import JointElasticity
+from scara_ident.effects.friction import AsymmetricFriction
 from scara_ident.effects.gear import TransmissionLoss
 from scara_ident.effects.measurement import TimeDelay
 from scara_ident.effects.position import Spring
@@ -39,6 +40,27 @@ GOOD = Examination(
 
 def decided(candidate: Candidate, item: Examination, tried: int, gain: float = 0.4) -> Decision:
     return decide(candidate, item, gain, SCENE, tried, CRITERIA)
+
+
+class Asks(Spring):
+    """One that an arm can have beside a friction of at least 0.3 alone."""
+
+    def inadmissible(self, scene, member, value, std):
+        known = [item.value[0] for item in scene.beside if item.effect == AsymmetricFriction()]
+        return None if known and min(known) >= 0.3 else "without friction"
+
+
+def test_what_an_arm_can_have_is_asked_beside_the_effects_in_the_model_as_they_are_fitted_with_it():
+    chosen = (Candidate(Spring(), Member(1)), Candidate(AsymmetricFriction(), Member(0)))
+    item = Candidate(Asks(), Member(0))
+    for friction, why in ((0.3, None), (0.2, "without friction")):
+        of_spring = np.full(len(Spring().columns(SCENE, Member(1))), 0.25)
+        found = replace(GOOD, model_value=np.array([*SCENE.value, *of_spring, friction]))
+        decision = decide(item, found, 0.4, SCENE, 100, CRITERIA, chosen)
+        assert decision.accepted is (why is None)
+        assert why is None or decision.why == why
+    assert decide(item, GOOD, 0.4, SCENE, 100, CRITERIA).why == "without friction"
+    assert SCENE.beside == ()
 
 
 def test_a_good_candidate_comes_in_and_its_gain_is_reported():

@@ -20,10 +20,11 @@ from scara_ident.diagnosis.testing.selection_step import (
 from scara_ident.diagnosis.testing.selection_step import observed as observed_with
 from scara_ident.effects import Member
 from scara_ident.effects.elasticity import JointElasticity
-from scara_ident.effects.friction import Stribeck
+from scara_ident.effects.friction import Stribeck, friction_places
 from scara_ident.effects.gear import TransmissionLoss
 from scara_ident.effects.measurement import TimeDelay, shifted
 from scara_ident.effects.position import Spring
+from scara_ident.effects.presliding import Presliding
 from scara_ident.effects.signals import LinkTorque
 from scara_ident.effects.tilt import BaseTilt
 from scara_ident.estimation import wls
@@ -31,7 +32,16 @@ from scara_ident.estimation.information import weighted
 from scara_ident.estimation.least_squares import value_and_weights
 from scara_ident.estimation.observations import observe
 from scara_ident.motion.prepared import prepare
-from tests.diagnosis.made import BANDS, Bump, exact_runs, observed, periodic_run, step_beside, with_torque
+from tests.diagnosis.made import (
+    BANDS,
+    Bump,
+    exact_runs,
+    observed,
+    periodic_run,
+    step_beside,
+    virtual_runs,
+    with_torque,
+)
 
 VELOCITY = 0.43
 CHOSEN = (Candidate(Spring(), Member(0)), Candidate(TransmissionLoss(), Member(1, (0.1,))))
@@ -269,3 +279,19 @@ def test_candidates_at_hand_that_act_together_with_effects_in_the_model_are_thos
     (beside,), (first,) = step.rows_at_hand(alone.scene, [other]), alone.rows_at_hand(alone.scene, [other])
     assert np.abs(beside[0] - first[0]).max() > 0.01 * np.abs(first[0]).max()
     assert_array_equal(beside[0], step.rows(step.scene, [other])[0][0])
+
+
+def test_what_an_arm_can_have_is_judged_beside_the_effects_in_the_model():
+    """Dry friction that builds up over a distance was refused as too much, beside friction at low speed that does so too."""
+    runs = virtual_runs("presliding:joint2:presliding_distance=0.01", "stribeck:joint2:amplitude=0.176:velocity=0.3")
+    chosen = (Candidate(Stribeck(), Member(1, (0.3,))), Candidate(Presliding(), Member(1, (0.01,))))
+    beside = step_beside(runs, chosen).without(1)
+    (decision,) = beside.judge(chosen[1:])
+    assert decision.accepted, decision.why
+    found, scene = decision.examination, beside.scene
+    coulomb = found.model_value[friction_places(scene, 1)[0]]
+    # By more than chance.
+    assert found.value[0] - 2.0 * np.sqrt(found.covariance[0, 0]) > 1.5 * coulomb
+    assert found.value[0] < 1.5 * (coulomb + found.model_value[len(scene.value)])
+    # What it is judged beside is known to the judgement alone.
+    assert scene.beside == ()
