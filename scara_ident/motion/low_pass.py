@@ -117,6 +117,57 @@ def low_pass_every(signal: Array, rate: float, cut: float | None, step: int, wei
     return np.asarray(result)
 
 
+def low_pass_between(signal: Array, rate: float, cut: float, step: int, every: int, weight: Array) -> Array:
+    """Return every ``step``-th sample of `low_pass`, of a signal that is given at every ``every``-th only.
+
+    Between the given samples the low-passed signal is known, as it holds nothing beyond half their rate.
+
+    Parameters
+    ----------
+    signal : ndarray, shape (k, N)
+    rate : float
+        Samples per second that ``step`` and ``every`` count.
+    cut : float
+        Frequency in Hz where half the amplitude is left, well below half the rate of the given samples.
+    weight : ndarray, shape (N,)
+        The signal is multiplied by it first.
+
+    Returns
+    -------
+    ndarray, shape (k, ceil(((N - 1) every + 1) / step))
+    """
+    if step % every == 0:
+        return low_pass_every(signal, rate / every, cut, step // every, weight)
+    count = signal.shape[-1]
+    reach, closed, low, gains = _between(count, rate / cut, step, every)
+    kept = -(-((count - 1) * every + 1) // step)
+    result = np.empty((len(signal), kept))
+    whole = np.zeros((min(ROWS_AT_ONCE, len(signal)), closed))
+    for begin in range(0, len(signal), ROWS_AT_ONCE):
+        some = weight * signal[begin : begin + ROWS_AT_ONCE]
+        flat = whole[: len(some)]
+        ramp, slope = _continue(some, reach, flat[:, : count + 2 * reach])
+        smooth = np.fft.irfft(np.fft.rfft(flat, axis=1)[:, : len(gains)] * gains, low, axis=1)
+        chord = ramp[:, reach : reach + 1] + slope * (np.arange(kept) * (step / every))
+        result[begin : begin + ROWS_AT_ONCE] = smooth[:, :: low // (closed * every // step)][:, :kept] + chord
+    return result
+
+
+@lru_cache(maxsize=24)
+def _between(count: int, ratio: float, step: int, every: int) -> tuple[int, int, int, NDArray[np.complexfloating]]:
+    """Return samples that continue a signal, and of it and of what is low-passed the lengths, and the gains from the first sample on."""
+    reach = min(count - 1, int(np.ceil(MEMORY_PERIODS * ratio / every)) + 1)
+    closed = _closed_length(count, reach, step)
+    kept = closed * every // step
+    frequency = np.arange(min(closed // 2, int(HIGHEST_RATIO * closed * every / ratio)) + 1) * (
+        ratio / (closed * every)
+    )
+    # As many times the kept samples as hold every frequency.
+    low = kept * int(np.ceil(2.0 * len(frequency) / kept))
+    gain = low / closed / (1.0 + frequency**8)
+    return reach, closed, low, gain * np.exp(2j * np.pi * reach / closed * np.arange(len(frequency)))
+
+
 def _by_phase(signals: Array, step: int) -> Array:
     """Return signals, shape (..., N), as those of each phase, shape (..., step, N / step): every step-th sample from it on."""
     return signals.reshape(*signals.shape[:-1], signals.shape[-1] // step, step).swapaxes(-1, -2)
@@ -226,19 +277,11 @@ def _filtered(
     count = signal.shape[-1]
     periods = rate / cut if cut is not None else 32.0
     reach = min(count - 1, int(np.ceil(MEMORY_PERIODS * periods)) + 1)
-    length, closed = count + 2 * reach, _closed_length(count, reach, step)
+    closed = _closed_length(count, reach, step)
     # The ends are zero without the chord, so zeros continue the signal.
     whole = np.zeros((*signal.shape[:-1], closed))
-    flat = whole[..., :length]
-    np.subtract(2.0 * signal[..., :1], signal[..., reach:0:-1], out=flat[..., :reach])
-    flat[..., reach : reach + count] = signal
-    np.subtract(2.0 * signal[..., -1:], signal[..., -2 : -reach - 2 : -1], out=flat[..., reach + count :])
-    # Without its chord the continued signal closes on itself; the chord is put back after.
-    start = flat[..., :1].copy()
-    slope = (flat[..., -1:] - start) / (length - 1)
-    ramp = np.arange(length, dtype=float) * slope
-    ramp += start
-    flat -= ramp
+    flat = whole[..., : count + 2 * reach]
+    ramp, slope = _continue(signal, reach, flat)
     if cut is None:
         # No filter would stop the kink where the ends meet from ringing through the derivatives.
         fade = np.sin(0.5 * np.pi * np.arange(reach) / reach) ** 2
@@ -253,6 +296,23 @@ def _filtered(
         elif order == 1:
             result += slope * rate
     return results
+
+
+def _continue(signal: Array, reach: int, out: Array) -> tuple[Array, Array]:
+    """Continue a signal (..., N) at both ends into ``out`` (..., N + 2 reach), and return its chord, taken away, and the chord's slope.
+
+    Without its chord the continued signal closes on itself; the chord is put back after.
+    """
+    count = signal.shape[-1]
+    np.subtract(2.0 * signal[..., :1], signal[..., reach:0:-1], out=out[..., :reach])
+    out[..., reach : reach + count] = signal
+    np.subtract(2.0 * signal[..., -1:], signal[..., -2 : -reach - 2 : -1], out=out[..., reach + count :])
+    start = out[..., :1].copy()
+    slope = (out[..., -1:] - start) / (out.shape[-1] - 1)
+    ramp = np.arange(out.shape[-1], dtype=float) * slope
+    ramp += start
+    out -= ramp
+    return ramp, slope
 
 
 @lru_cache(maxsize=24)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scara_ident.arrays import Array
 from scara_ident.errors import UsageError
 from scara_ident.manners import Frozen
-from scara_ident.motion.low_pass import HIGHEST_CUT, ROWS_AT_ONCE, low_pass, low_pass_every
+from scara_ident.motion.low_pass import HIGHEST_CUT, ROWS_AT_ONCE, low_pass, low_pass_between, low_pass_every
 from scara_ident.motion.motion import Motion, Stretch, motion_of, stretches, torque_of, with_effort_of
 from scara_ident.motion.periods import Periods, periods_of
 from scara_ident.motion.rest import FEW_SAMPLES, Bands, at_ends, fading, position_cuts, standstill
@@ -173,10 +173,9 @@ class PreparedStretch:
 
     @made_once
     def decimation(self) -> int:
-        """Number of samples per sample of `decimated`: as many as the band allows, such that every step is a multiple of it."""
+        """Number of samples per sample of `decimated`: as many as the band allows."""
         widest = max(np.inf if band is None else band for band in self.bands)
-        most = int(self.rate / (SMOOTH_PER_PERIOD * widest) * (1.0 + ROUNDING))
-        return max((every for every in range(2, most + 1) if not any(step % every for step in self.steps)), default=1)
+        return max(1, int(self.rate / (SMOOTH_PER_PERIOD * widest) * (1.0 + ROUNDING)))
 
     @made_once
     def decimated(self) -> Motion:
@@ -227,7 +226,10 @@ class PreparedStretch:
             found[acting] = self.rows(joint, signals[acting], every)
             return found
         step, band, fade = self.steps[joint], self.bands[joint], self.fade[joint, ::every]
-        rows = low_pass_every(signals, self.rate / every, band, step // every, fade)
+        if band is None or every == 1:
+            rows = low_pass_every(signals, self.rate, band, step, fade)
+        else:
+            rows = low_pass_between(signals, self.rate, band, step, every, fade)
         return np.asarray(rows.take(self.kept[joint] // step, axis=1) * np.sqrt(step))
 
     def rows_of(self, signals: Sequence[tuple[int, Array]], every: int = 1) -> list[Array]:

@@ -8,7 +8,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from scara_ident.motion.low_pass import derivative, differentiate, low_pass, low_pass_every, noise_share, removed_share
+from scara_ident.motion.low_pass import (
+    ROWS_AT_ONCE,
+    derivative,
+    differentiate,
+    low_pass,
+    low_pass_between,
+    low_pass_every,
+    noise_share,
+    removed_share,
+)
 from scara_ident.motion.prepared import row_step
 from tests.motion.test_motion import RATE, sine
 
@@ -109,6 +118,30 @@ def test_the_low_pass_at_kept_samples_is_the_low_pass(count: int, cut: float, st
     assert_allclose(
         low_pass(walk, rate, cut, step)[:, inner], low_pass(walk, rate, cut)[:, inner], rtol=0, atol=1e-6 * np.ptp(walk)
     )
+
+
+@settings(max_examples=60)
+@given(
+    count=st.integers(4, 3000), cut=st.floats(2.0, 100.0), step=st.integers(1, 60), every=st.integers(1, 12),
+    rows=st.integers(0, 2 * ROWS_AT_ONCE + 1), seed=st.integers(0, 2**16),
+)  # fmt: skip
+def test_the_low_pass_between_given_samples_is_the_low_pass(
+    count: int, cut: float, step: int, every: int, rows: int, seed: int
+):
+    """At every sample of a signal that moves on evenly between the given ones, from its first on."""
+    rate = 500.0
+    step = min(step, row_step(rate, cut))
+    every = min(every, max(1, int(rate / (20.0 * cut))))
+    random = np.random.default_rng(seed)
+    time = np.arange((count - 1) * every + 1) / rate
+    frequency = cut * np.array([0.2, 0.6, 0.9, 1.3, 2.0])[:, None]
+    slow = random.standard_normal((rows, 5)) @ np.sin(2.0 * np.pi * frequency * time + frequency) + 3.0 * time
+    # Without a step in what is filtered, which the given samples do not hold.
+    weight = np.sin(np.pi * np.arange(len(time)) / max(1, len(time) - 1)) ** 4
+    found = low_pass_between(slow[:, ::every], rate, cut, step, every, weight[::every])
+    expected = low_pass_every(slow, rate, cut, step, weight)
+    assert found.shape == expected.shape
+    assert_allclose(found, expected, rtol=0, atol=1e-3 * np.max(np.abs(slow), initial=1.0))
 
 
 @pytest.mark.parametrize("step", [1, 4])

@@ -53,17 +53,20 @@ def test_rows_are_the_low_pass_at_the_kept_samples_weighted_to_stand_for_all(run
         assert_allclose(part.rows(j, signals), expected, rtol=0, atol=1e-11 * np.max(np.abs(smooth)))
 
 
-def test_fewer_samples_of_what_is_smooth_give_the_same_rows(run: Recording):
-    part = only(run, BELOW)
-    every = part.decimation
-    assert (part.steps, every, int(RATE / (SMOOTH_PER_PERIOD * BELOW[1]))) == ((72, 48), 6, 6)
-    # Steps of 80 and 57 samples have no common part, and without a band nothing is left out.
-    assert only(run, (2.5, 3.5)).decimation == 1 and only(run, (2.5, None)).decimation == 1
+# Rows of 72 and 48 samples, and of 80 and 57, which have no common part.
+@pytest.mark.parametrize(("bands", "steps", "every"), [(BELOW, (72, 48), 6), ((2.5, 3.5), (80, 57), 7)])
+def test_fewer_samples_of_what_is_smooth_give_the_same_rows(
+    run: Recording, bands: tuple[float, float], steps: tuple[int, int], every: int
+):
+    part = only(run, bands)
+    assert (part.steps, part.decimation, int(RATE / (SMOOTH_PER_PERIOD * bands[1]))) == (steps, every, every)
+    # Without a band nothing is left out.
+    assert only(run, (2.5, None)).decimation == 1
     time, random = np.arange(part.samples) / RATE, np.random.default_rng(0)
     # Up to where the low-pass of the positions ends, and some of it beyond.
     frequency, angle = np.array([[0.3], [1.1], [3.9], [9.0], [14.0]]), random.uniform(0.0, 2.0 * np.pi, (5, 1))
     signals = random.standard_normal((3, 5)) @ np.sin(2.0 * np.pi * frequency * time + angle)
-    whole = only(run, BELOW)
+    whole = only(run, bands)
     vars(whole)["rest"] = np.zeros((2, whole.samples), dtype=bool)
     vars(whole)["fade"] = np.ones((2, whole.samples))
     # Towards the end the filter continues a signal from its last sample, and the fade towards rest is as long as a few samples.
