@@ -17,8 +17,8 @@ from scara_ident.inquiry.belief import Blocks, believed, known_blocks
 from scara_ident.inquiry.questions import MAX_NAMED, Question, Suspect
 from scara_ident.manners import listed
 from scara_ident.motion.motion import Motion
-from scara_ident.motion.prepared import block_seconds
 from scara_ident.motion.rest import Bands
+from scara_ident.motion.sampling import block_seconds
 
 # Samples per second of a motion whose promise is given.
 FINE_RATE = 1000.0

@@ -21,25 +21,22 @@ from scara_ident.manners import Frozen
 from scara_ident.motion.low_pass import HIGHEST_CUT, ROWS_AT_ONCE, low_pass, low_pass_between, low_pass_every
 from scara_ident.motion.motion import Motion, Stretch, motion_of, stretches, torque_of, with_effort_of
 from scara_ident.motion.periods import Periods, periods_of
-from scara_ident.motion.rest import FEW_SAMPLES, Bands, at_ends, fading, position_cuts, standstill
+from scara_ident.motion.rest import Bands, at_ends, fading, position_cuts, standstill
+from scara_ident.motion.sampling import (
+    ROUNDING,
+    SMOOTH_PER_PERIOD,
+    block_seconds,
+    row_step,
+    samples_per,
+)
 from scara_ident.motion.trajectories import Trajectories, trajectories_of
 from scara_ident.recording.recording import Recording
 from scara_ident.threads import made_once, side_by_side
 
-# Rows per period of the band that are kept: the filter passes little above 1.25 times its cutoff.
-ROWS_PER_PERIOD = 2.5
-# Samples per period of the band for smooth functions of the motion, which has passed a low-pass of three times the
-# band: the smallest number that preserves every reversal of a joint, see `FEW_SAMPLES`.
-SMOOTH_PER_PERIOD = FEW_SAMPLES
 # Periods of the band left out at both ends of a stretch, where the filter's continuation is a guess, and the least
 # number of samples, where an unfiltered derivative rings.
 END_PERIODS = 1.0
 END_SAMPLES = 20
-# A rate is known only up to rounding; a number this near to a whole number counts as one.
-ROUNDING = 1e-9
-# Blocks are long compared with the memory of the band, so that scores of different blocks are nearly independent.
-BLOCK_PERIODS = 4.0
-BLOCK_SECONDS = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,8 +171,7 @@ class PreparedStretch:
     @made_once
     def decimation(self) -> int:
         """Number of samples per sample of `decimated`: as many as the band allows."""
-        widest = max(np.inf if band is None else band for band in self.bands)
-        return max(1, int(self.rate / (SMOOTH_PER_PERIOD * widest) * (1.0 + ROUNDING)))
+        return samples_per(self.rate, self.bands, SMOOTH_PER_PERIOD)
 
     @made_once
     def decimated(self) -> Motion:
@@ -217,7 +213,7 @@ class PreparedStretch:
         signals : ndarray, shape (k, N)
             Columns of the joint's equation, or its torque.
         every : int, optional
-            The signals are given at every so many samples, 1 or `decimation`.
+            The signals are given at every so many samples.
         """
         acting = np.any(signals, axis=1)
         if not np.all(acting):
@@ -388,14 +384,3 @@ def _check_bands(bands: Bands, joints: Sequence[str]) -> None:
     for joint, band in zip(joints, bands, strict=True):
         if band is not None and not (isinstance(band, Real) and 0.0 < band < np.inf):
             raise UsageError(f"band of {joint} is {band!r}; expected a frequency above 0 in Hz, or None")
-
-
-def block_seconds(bands: Sequence[float | None]) -> float:
-    """Return the length of the blocks of time, s."""
-    slowest = min((band for band in bands if band is not None), default=np.inf)
-    return float(max(BLOCK_SECONDS, BLOCK_PERIODS / slowest))
-
-
-def row_step(rate: float, band: float | None) -> int:
-    """Return the number of samples per row in a band."""
-    return 1 if band is None else max(1, int(rate / (ROWS_PER_PERIOD * band) * (1.0 + ROUNDING)))

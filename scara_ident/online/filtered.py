@@ -27,8 +27,8 @@ from numpy.typing import NDArray
 from scara_ident.arrays import Array
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.motion import Motion
-from scara_ident.motion.prepared import ROUNDING, SMOOTH_PER_PERIOD
 from scara_ident.motion.rest import POSITION_BAND, REST_WIDEN
+from scara_ident.motion.sampling import SMOOTH_PER_PERIOD, samples_per
 
 # Highest band as a share of the sample rate: the low-pass of positions must end below half the rate.
 HIGHEST_BAND = 0.1
@@ -162,7 +162,7 @@ def row_filter(rate: float, band: float, block: int) -> RowFilter:
     block : int
         Raw samples that a block is to have at the least.
     """
-    every = max(1, int(rate / (SMOOTH_PER_PERIOD * band) * (1.0 + ROUNDING)))
+    every = samples_per(rate, (band,), SMOOTH_PER_PERIOD)
     step = max(1, round(rate / (2.0 * band * every)))
     rows = max(BLOCK_ROWS, -(-block // (step * every)))
     pulses, one = np.zeros((rows, (rows - 1 + 2 * SPAN) * step + 1)), np.sqrt(every) * pulse(step)

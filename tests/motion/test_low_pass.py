@@ -18,7 +18,7 @@ from scara_ident.motion.low_pass import (
     noise_share,
     removed_share,
 )
-from scara_ident.motion.prepared import row_step
+from scara_ident.motion.sampling import row_step
 from tests.motion.test_motion import RATE, sine
 
 

@@ -16,7 +16,8 @@ from scara_ident.identification.identify import identify
 from scara_ident.model.model import TorqueModel
 from scara_ident.motion.low_pass import low_pass, low_pass_every
 from scara_ident.motion.motion import stretches
-from scara_ident.motion.prepared import BLOCK_SECONDS, SMOOTH_PER_PERIOD, PreparedStretch, prepare, row_step
+from scara_ident.motion.prepared import PreparedStretch, prepare
+from scara_ident.motion.sampling import BLOCK_SECONDS, SMOOTH_PER_PERIOD, row_step
 from scara_ident.recording.audit import Finding
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import Robot, load_robot
@@ -161,12 +162,6 @@ def test_what_is_guessed_at_the_ends_does_not_reach_the_rows():
     for j in range(2):
         rows = part.rows(j, wrong[j : j + 1]) / np.sqrt(part.steps[j])
         assert np.max(np.abs(rows)) < 2e-4 * np.max(np.abs(true[j]))
-
-
-def test_a_row_stands_for_two_and_a_half_per_period():
-    assert row_step(1000.0, 10.0) == 40
-    assert row_step(1000.0, None) == 1
-    assert row_step(100.0, 90.0) == 1
 
 
 def test_the_slowest_band_decides_what_is_cut_at_the_ends(run: Recording):

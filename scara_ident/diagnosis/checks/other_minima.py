@@ -15,9 +15,9 @@ import numpy as np
 from scara_ident.diagnosis.candidates.candidates import Candidate, CandidateColumns, columns_at_hand
 from scara_ident.diagnosis.checks.same_errors import same
 from scara_ident.diagnosis.fitting.effect_parameters import physical_parameters, size_is_determined
-from scara_ident.diagnosis.fitting.linearised import linearise
 from scara_ident.diagnosis.fitting.nonlinear_fit import MAX_RISE, MIN_DECREASE, tune
 from scara_ident.diagnosis.fitting.part_of_recordings import on_all, on_part
+from scara_ident.diagnosis.fitting.present_model import present_model
 from scara_ident.diagnosis.testing.selection_step import SelectionStep
 from scara_ident.effects import Parameter
 from scara_ident.errors import RecordingError
@@ -50,7 +50,7 @@ def lowest(step: SelectionStep) -> SelectionStep:
     first = tune(step)
     if len(_together(first)) < 2:
         return first
-    best = _Fit(replace(first, minima=()), linearise(first).error)
+    best = _Fit(replace(first, minima=()), present_model(first).error)
     alternatives = _alternatives(best)
     if alternatives and alternatives[0].near(best):
         other = _fitted(alternatives[0].step)
@@ -72,7 +72,7 @@ def as_good(step: SelectionStep) -> Iterator[SelectionStep]:
     if not places:
         return
     if len(places) > 1:
-        own = _Fit(step, linearise(step).error)
+        own = _Fit(step, present_model(step).error)
         yield from (each.step for each in _alternatives(own) if each.near(own) and _alike(step, each.step, places))
         below = _below(step)
         if below is not None and _others(step, below, places):
@@ -80,7 +80,7 @@ def as_good(step: SelectionStep) -> Iterator[SelectionStep]:
     for member in step.chosen[places[0]].effect.unfound(step.scene, step.chosen[places[0]].member):
         further = replace(step.chosen[places[0]], member=member)
         other = tune(replace(step, chosen=(*step.chosen, further)))
-        if linearise(other).error < (1.0 - MAX_RISE) * linearise(step).error:
+        if present_model(other).error < (1.0 - MAX_RISE) * present_model(step).error:
             yield other
 
 
@@ -112,7 +112,7 @@ def _acting(step: SelectionStep) -> tuple[Candidate, ...]:
 
 def _fitted(step: SelectionStep, *, coarse: bool = False) -> _Fit:
     found = tune(step, coarse=coarse)
-    return _Fit(found, linearise(found).error)
+    return _Fit(found, present_model(found).error)
 
 
 def _alternatives(own: _Fit) -> list[_Fit]:
@@ -126,7 +126,7 @@ def _alternatives(own: _Fit) -> list[_Fit]:
     else:
         part = on_part(step)
         ends = [tune(begun, coarse=True) for begun in _elsewhere(part)]
-        found = [_Fit(end, linearise(end).error) for end in (on_all(end, step) for end in ends)]
+        found = [_Fit(end, present_model(end).error) for end in (on_all(end, step) for end in ends)]
         if part is not step:
             found = [_fitted(each.step, coarse=True) for each in found if each.error < ALTERNATIVE * own.error]
     found = [each for each in found if each.error < ALTERNATIVE * own.error and not _same(each.step, step)]

@@ -19,7 +19,7 @@ from scara_ident.diagnosis.testing.selection_step import SelectionStep, observed
 from scara_ident.effects import Interval, Scene
 from scara_ident.effects.two_states import instants, scatter_of
 from scara_ident.estimation.least_squares import value_and_weights
-from scara_ident.motion.prepared import ROWS_PER_PERIOD
+from scara_ident.motion.sampling import ROWS_PER_PERIOD
 
 # Intervals and all other parameters are fitted in turn; what moves further is less than a row.
 ROUNDS = 2

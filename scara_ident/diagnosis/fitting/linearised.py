@@ -14,17 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
-from scara_ident.diagnosis.candidates.candidates import Candidate, CandidateColumns, Rows, with_columns
+from scara_ident.diagnosis.candidates.candidates import Candidate, CandidateColumns, Rows
 from scara_ident.diagnosis.candidates.finite_columns import torque_slope
-from scara_ident.diagnosis.candidates.unknowns import Unknown, unknowns_of
+from scara_ident.diagnosis.candidates.unknowns import Unknown
+from scara_ident.diagnosis.fitting.present_model import PresentModel, pooled, present_model
 from scara_ident.diagnosis.fitting.trust_region import least_squares, length, within_radius
 from scara_ident.diagnosis.testing.fitted_model import FittedModel
 from scara_ident.diagnosis.testing.selection_step import SelectionStep
 from scara_ident.effects import Scene, Tie
-from scara_ident.estimation.information import Information, merge, weighted
+from scara_ident.estimation.information import Information, merge
 from scara_ident.estimation.joint_rows import JointRows
-from scara_ident.estimation.run_variation import RunVariation
-from scara_ident.threads import one_blas_thread, side_by_side
 
 # A row that ties a coefficient is so many times as weighty as all rows that it acts on.
 TIGHTNESS = 1e3
@@ -36,8 +35,8 @@ class Linearised:
 
     Attributes
     ----------
-    places : tuple of slice
-        Columns of each effect.
+    present : PresentModel
+        The same without derivatives.
     joints : tuple of JointRows
         Columns of the base model, of the effects, and the change of the torque per unit of each nonlinear parameter.
     information : Information
@@ -46,13 +45,35 @@ class Linearised:
         Rows that hold the coefficients of tied effects to what the nonlinear parameters and the rigid bodies say of them.
     """
 
-    scene: Scene
-    chosen: tuple[Candidate, ...]
-    unknowns: tuple[Unknown, ...]
-    places: tuple[slice, ...]
+    present: PresentModel
     joints: tuple[JointRows, ...]
     information: Information
     ties: Information
+
+    @property
+    def scene(self) -> Scene:
+        """That of its step."""
+        return self.present.scene
+
+    @property
+    def chosen(self) -> tuple[Candidate, ...]:
+        """The effects."""
+        return self.present.chosen
+
+    @property
+    def unknowns(self) -> tuple[Unknown, ...]:
+        """The nonlinear parameters."""
+        return self.present.unknowns
+
+    @property
+    def places(self) -> tuple[slice, ...]:
+        """Columns of each effect."""
+        return self.present.places
+
+    @property
+    def error(self) -> float:
+        """Squared residual at the present nonlinear parameters, see `PresentModel.error`."""
+        return self.present.error
 
     @property
     def linear(self) -> int:
@@ -80,7 +101,7 @@ class Linearised:
 
     @property
     def _fitted(self) -> NDArray[np.bool_]:
-        return self._free & _left_in(self.chosen, self.places, self.information.parameters)
+        return np.append(self.present.fitted, np.zeros(len(self.unknowns), dtype=bool))
 
     @cached_property
     def rows(self) -> int:
@@ -92,27 +113,10 @@ class Linearised:
         """Mean squared residual of a weighted row."""
         return self.information.residual_sum(self.best) / self.rows
 
-    @property
-    def error(self) -> float:
-        """Squared residual with what the priors add to it, the bodies as they were where effects follow from them."""
-        left = self.variance * self.rows
-        if len(self.ties.factor):
-            left = self.information.residual_sum(_solved(self.information, self._held, self._fitted))
-        return left + self._prior_sum(np.zeros(len(self.unknowns)))
-
     def _prior_sum(self, changes: Array) -> float:
         """Return what the priors add to the squared residual after changes of the nonlinear parameters."""
         pairs = zip(self.unknowns, changes, strict=True)
         return float(self.variance * sum(((item.value + x - item.nominal) / item.spread) ** 2 for item, x in pairs))
-
-    @property
-    def _held(self) -> Information:
-        """The ties, and rows that hold the rigid bodies to the present estimate."""
-        place = self.scene.model.place(self.scene.model.rigid_body)
-        size = np.linalg.norm(self.information.factor[:, place], axis=0)
-        rows = np.zeros((len(size), self.information.parameters + 1))
-        rows[:, place], rows[:, -1] = np.diag(size), size * self.scene.value[place]
-        return merge([self.ties, Information(TIGHTNESS * rows, 0.0)])
 
     @property
     def prior(self) -> Information:
@@ -179,36 +183,42 @@ class Linearised:
 
 
 def linearise(step: SelectionStep) -> Linearised:
-    """Return the model of a step, linear about the present nonlinear parameters.
+    """Return the model of a step, linear about the present nonlinear parameters."""
+    return linear_model(present_model(step))
 
-    What offsets of runs make is noise, see `Estimate.offsets`.
-    """
-    scene, columns, chosen, weights = step.scene, step.columns, step.chosen, step.weights
-    observations = columns.observations
-    unknowns = unknowns_of(scene, chosen, step.criteria.rotor_inertia_std)
-    own = columns.rows(scene, chosen)
-    bounds = observations.parameters + np.cumsum([0, *(len(next(iter(rows.values()))) for rows in own)])
-    places = tuple(slice(int(a), int(b)) for a, b in zip(bounds[:-1], bounds[1:], strict=True))
-    joints = with_columns(observations, own)
-    linear, total = int(bounds[-1]), int(bounds[-1]) + len(unknowns)
+
+def linear_model(present: PresentModel) -> Linearised:
+    """Return the model at its present nonlinear parameters as one that is linear about them."""
+    step, scene, chosen, unknowns = present.step, present.scene, present.chosen, present.unknowns
+    joints, columns, linear, total = (
+        present.joints,
+        step.columns,
+        present.linear,
+        present.linear + len(present.unknowns),
+    )
     slopes: dict[int, Rows] = {}
-    ties = []
-    for owner, candidate in enumerate(chosen):
-        tie = candidate.effect.tie(scene, candidate.member)
+    rows = []
+    for owner, (candidate, tie) in enumerate(zip(chosen, present.ties, strict=True)):
         if tie is not None:
             slopes[owner] = columns.slopes(scene, candidate)
-            place = scene.model.place(scene.model.rigid_body)
-            by_bodies = {joint: own[: place.stop - place.start] for joint, own in slopes[owner].items()}
-            joints = _with_slopes(joints, by_bodies, place.start, scene)
-            size = _size(joints, int(bounds[owner]), weights)
-            ties.append(TIGHTNESS * size * _tie_row(scene, chosen, unknowns, owner, tie, int(bounds[owner]), linear))
-    held = Information(np.array(ties).reshape(-1, total + 1), 0.0)
-    fitted = np.append(_left_in(chosen, places, linear), np.zeros(len(unknowns), dtype=bool))
-    value = _solved(_pooled(joints, total, weights, step.offsets), held, fitted)[:linear]
-    changes = [_change(scene, columns, chosen, item, places, value, slopes) for item in unknowns]
+            bodies, own = scene.model.place(scene.model.rigid_body), present.places[owner].start
+            by_bodies = {joint: each[: bodies.stop - bodies.start] for joint, each in slopes[owner].items()}
+            joints = _with_slopes(joints, by_bodies, bodies.start, scene)
+            size = _size(joints, own, step.weights)
+            rows.append(TIGHTNESS * size * _tie_row(scene, chosen, unknowns, owner, tie, own, linear))
+    ties = Information(np.array(rows).reshape(-1, total + 1), 0.0)
+    held = Information(np.delete(ties.factor, np.s_[linear:total], axis=1), 0.0)
+    information = pooled(joints, linear, step) if slopes else present.information
+    value = _solved(information, held, present.fitted)
+    changes = [_change(scene, columns, chosen, item, present.places, value, slopes) for item in unknowns]
     extended = tuple(_beside(rows, joint, changes, linear) for joint, rows in enumerate(joints))
-    information = _pooled(extended, total, weights, step.offsets)
-    return Linearised(scene, chosen, unknowns, places, extended, information, held)
+    return Linearised(present, extended, pooled(extended, total, step), ties)
+
+
+def follow_estimate(present: PresentModel) -> bool:
+    """Whether columns of any effect follow the parameters of the base model, other than by a tie."""
+    pairs = zip(present.chosen, present.ties, strict=True)
+    return any(item.effect.follows_estimate and tie is None for item, tie in pairs)
 
 
 def with_estimate_slopes(step: SelectionStep, state: Linearised) -> Linearised:
@@ -219,16 +229,16 @@ def with_estimate_slopes(step: SelectionStep, state: Linearised) -> Linearised:
     state : Linearised
         As `linearise` returns it, to which such columns are given.
     """
+    if not follow_estimate(state.present):
+        return state
     scene, joints = step.scene, state.joints
-    for candidate, place in zip(step.chosen, state.places, strict=True):
-        if candidate.effect.follows_estimate and candidate.effect.tie(scene, candidate.member) is None:
+    for candidate, place, tie in zip(step.chosen, state.places, state.present.ties, strict=True):
+        if candidate.effect.follows_estimate and tie is None:
             value = state.value[place]
             # The torque of what was taken out of the data is zero, whatever the parameters are.
             slopes = step.columns.estimate_slopes(scene, candidate, value) if np.any(value) else {}
             joints = _with_slopes(joints, slopes, 0, scene)
-    if joints is state.joints:
-        return state
-    information = _pooled(joints, state.information.parameters, step.weights, step.offsets)
+    information = pooled(joints, state.information.parameters, step)
     return replace(state, joints=joints, information=information)
 
 
@@ -239,14 +249,6 @@ def freed_model(step: SelectionStep) -> FittedModel:
     """
     state = linearise(step)
     return step.fitted(state.joints, state.information.parameters)
-
-
-def _left_in(chosen: Sequence[Candidate], places: Sequence[slice], count: int) -> NDArray[np.bool_]:
-    """Return which of so many parameters are of what is in the model: nothing is left of what was taken out of the data."""
-    kept = np.ones(count, dtype=bool)
-    for candidate, place in zip(chosen, places, strict=True):
-        kept[place] = not candidate.corrects_data
-    return kept
 
 
 def _solved(information: Information, ties: Information, fitted: NDArray[np.bool_]) -> Array:
@@ -323,12 +325,6 @@ def _size(joints: Sequence[JointRows], column: int, weights: Array) -> float:
     """Return the weighted length of a column."""
     parts = (rows.table[:-1][rows.columns == column] for rows in joints)
     return float(np.linalg.norm([w * np.linalg.norm(part) for w, part in zip(weights, parts, strict=True)]))
-
-
-def _pooled(joints: Sequence[JointRows], parameters: int, weights: Array, offsets: RunVariation | None) -> Information:
-    joints = joints if offsets is None else offsets.whitened_rows(joints)
-    with one_blas_thread():
-        return weighted(side_by_side(lambda rows: rows.information(parameters), joints), weights)
 
 
 def _change(

@@ -14,7 +14,14 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.fitting.at_estimate import at_estimate, estimate_of, without_others
-from scara_ident.diagnosis.fitting.linearised import Linearised, linearise, moved_candidate, with_estimate_slopes
+from scara_ident.diagnosis.fitting.linearised import (
+    Linearised,
+    follow_estimate,
+    linear_model,
+    moved_candidate,
+    with_estimate_slopes,
+)
+from scara_ident.diagnosis.fitting.present_model import present_model
 from scara_ident.diagnosis.testing.selection_step import SelectionStep
 
 # Steps of Gauss and Newton; most fits settle in three, and a search has further ones. A tied effect comes from far away.
@@ -58,25 +65,27 @@ def tune(step: SelectionStep, *, coarse: bool = False) -> SelectionStep:
     way, radius, cut = np.zeros(0), np.inf, False
     tied = any(item.effect.tie(step.scene, item.member) is not None for item in step.chosen)
     for _ in range(MAX_TIED_STEPS if tied else MAX_STEPS):
-        now = linearise(step)
+        present = present_model(step)
         if best is not None:
-            radius = _radius(radius, best.length(way), _kept(best, now, way))
-        if best is not None and now.error > (1.0 + MAX_RISE) * best.error:
+            radius = _radius(radius, best.length(way), _kept(best, present.error, way))
+        if best is not None and present.error > (1.0 + MAX_RISE) * best.error:
             if radius < MIN_RADIUS * best.length(best.step()):
                 break
         else:
-            # Where the way is longer than a step may be, how little one gains says nothing of the whole, of which the model does.
-            whole, std = now.step(), now.solve()[1]
-            near = coarse and (not cut or now.gain(whole) < MIN_DECREASE)
-            arrived = near and best is not None and best.error - now.error < MIN_DECREASE * best.error
-            best = now
-            if _is_short(now, whole, std, settling):
-                if _is_cut(now, whole):
+            little = best is not None and best.error - present.error < MIN_DECREASE * best.error
+            if coarse and little and not cut:
+                # Near enough, without a look at where it might go on to.
+                return step
+            best = linear_model(present)
+            whole, std = best.step(), best.solve()[1]
+            if _is_short(best, whole, std, settling):
+                if _is_cut(best, whole):
                     break
                 # So short a step needs no look at where it leads.
-                step = _moved(step, now, whole)
-                return replace(step, scene=at_estimate(step.scene, step.chosen, whole[: now.linear]))
-            if arrived:
+                step = _moved(step, best, whole)
+                return replace(step, scene=at_estimate(step.scene, step.chosen, whole[: best.linear]))
+            # Where the way is longer than a step may be, how little one gains says nothing of the whole, of which the model does.
+            if coarse and little and best.gain(whole) < MIN_DECREASE:
                 break
         way = best.step(radius)
         if radius < np.inf and _is_short(best, way, std, settling):
@@ -96,11 +105,11 @@ def _settled(step: SelectionStep) -> SelectionStep:
     """
     best, error = step, np.inf
     for _ in range(MAX_STEPS):
-        plain = linearise(step)
-        state = with_estimate_slopes(step, plain)
-        if state is plain or plain.error > error:
+        present = present_model(step)
+        if not follow_estimate(present) or present.error > error:
             break
-        best, error = step, plain.error
+        state = with_estimate_slopes(step, linear_model(present))
+        best, error = step, present.error
         started, std = estimate_of(step.scene, step.chosen), state.solve()[1][: state.linear]
         # What follows it is compared, which is the base model's.
         own = slice(0, step.observations.parameters)
@@ -128,11 +137,11 @@ def _is_cut(state: Linearised, way: Array) -> bool:
     return any(abs(x) >= item.reach for item, x in zip(state.unknowns, way[state.linear :], strict=True))
 
 
-def _kept(before: Linearised, after: Linearised, way: Array) -> float:
+def _kept(before: Linearised, error: float, way: Array) -> float:
     """Return the share of what the linear model promised that a way kept; negative where the error rose."""
     # A promise is a share of the error: one below rounding is none.
     promised = max(before.gain(way), np.finfo(float).eps)
-    return (before.error - after.error) / (promised * before.error)
+    return (before.error - error) / (promised * before.error)
 
 
 def _radius(radius: float, length: float, kept: float) -> float:

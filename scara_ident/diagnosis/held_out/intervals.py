@@ -17,7 +17,7 @@ from scara_ident.diagnosis.fitting.interval_fit import JointSeen, bounds_of_cell
 from scara_ident.effects import Interval, Scene
 from scara_ident.effects.two_states import instants, likeliest, scatter_of
 from scara_ident.estimation.observations import Observations
-from scara_ident.motion.prepared import ROWS_PER_PERIOD
+from scara_ident.motion.sampling import ROWS_PER_PERIOD
 
 # Rounds in which an offset of the recording's own and intervals are found in turn.
 ROUNDS = 6

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.estimation.residuals import Residuals
-from scara_ident.motion.prepared import BLOCK_PERIODS, BLOCK_SECONDS, PreparedStretch
+from scara_ident.motion.prepared import PreparedStretch
+from scara_ident.motion.sampling import BLOCK_PERIODS, BLOCK_SECONDS
 from scara_ident.motion.trajectories import LARGEST_SHIFT, SAME_RATE, alignment
 
 # Residual of every joint, where it was used, and samples per second.

@@ -91,7 +91,7 @@ def test_fits_begin_where_those_of_the_same_effects_ended(monkeypatch: pytest.Mo
 
     module = sys.modules[lowest.__module__]
     monkeypatch.setattr(module, "tune", tuned)
-    monkeypatch.setattr(module, "linearise", error)
+    monkeypatch.setattr(module, "present_model", error)
     best = lowest(step)
     assert begun[:5] == [[9.0, 8.0], [5.625, 8.0], [14.4, 8.0], [9.0, 5.0], [9.0, 12.8]]
     # Those that leave twice as much are no rivals; the others are fitted to all recordings too.
@@ -202,7 +202,7 @@ def test_what_ended_in_the_same_minimum_is_no_confounder(monkeypatch: pytest.Mon
 
     module = sys.modules[lowest.__module__]
     monkeypatch.setattr(module, "tune", tuned)
-    monkeypatch.setattr(module, "linearise", lambda _: SimpleNamespace(error=10.0))
+    monkeypatch.setattr(module, "present_model", lambda _: SimpleNamespace(error=10.0))
     best = lowest(step)
     assert [[item.member.nonlinear[0] for item in each] for each in best.minima] == [
         [9.0, 8.0], [5.625, 8.0], [9.0, 5.0], [9.0, 12.8]

@@ -162,7 +162,8 @@ def test_beside_a_parameter_at_its_bound_all_others_are_the_best_without_it() ->
     place, last = free.linear + 1, free.unknowns[1]
     away = np.sign(free.solve()[0][place])
     ends = {"upper": last.value} if away > 0.0 else {"lower": last.value}
-    stuck = replace(free, unknowns=(free.unknowns[0], replace(last, **ends), *free.unknowns[2:]))
+    unknowns = (free.unknowns[0], replace(last, **ends), *free.unknowns[2:])
+    stuck = replace(free, present=replace(free.present, unknowns=unknowns))
     change, _ = stuck.solve()
     rows = np.delete(np.vstack([free.information.factor, free.prior.factor]), place, axis=1)
     scale = np.linalg.norm(rows[:, :-1], axis=0)
@@ -214,7 +215,7 @@ def test_a_step_ends_where_its_room_does_and_the_others_make_the_best_of_that() 
     low, high = state.unknowns[0].room
     narrow = replace(state.unknowns[0], lower=state.unknowns[0].value - 1e-4, upper=state.unknowns[0].value + 1e-4)
     assert max(low, -1e-4) > free[place] or free[place] > min(high, 1e-4)
-    found = replace(state, unknowns=(narrow, *state.unknowns[1:])).step()
+    found = replace(state, present=replace(state.present, unknowns=(narrow, *state.unknowns[1:]))).step()
     assert abs(found[place]) == pytest.approx(1e-4)
     rows = np.vstack([state.information.factor, state.prior.factor])
     others = np.delete(rows, place, axis=1)

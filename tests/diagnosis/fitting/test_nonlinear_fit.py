@@ -343,17 +343,21 @@ def test_a_coarse_fit_goes_on_where_a_step_was_cut_short_that_the_model_promises
     errors, promised = iter([100.0, 99.5, 99.0, 98.9]), iter([0.5, 0.5, 0.01, 0.0])
     seen = []
 
-    def made(step: SelectionStep) -> SimpleNamespace:
-        error, own = next(errors), next(promised)
-        seen.append(error)
+    def present(step: SelectionStep) -> SimpleNamespace:
+        seen.append(next(errors))
+        return SimpleNamespace(error=seen[-1])
+
+    def made(present: SimpleNamespace) -> SimpleNamespace:
+        own = next(promised)
         return SimpleNamespace(
-            linear=0, unknowns=(), chosen=(), scene=None, value=np.zeros(0), error=error,
+            linear=0, unknowns=(), chosen=(), scene=None, value=np.zeros(0), error=present.error,
             gain=lambda way: own, solve=lambda: (np.zeros(1),) * 2, step=lambda *_: np.zeros(1), length=lambda way: 1.0,
         )  # fmt: skip
 
     module = sys.modules[tune.__module__]
     step = step_beside(exact_runs(), [Candidate(Spring(), Member(1))])
-    monkeypatch.setattr(module, "linearise", made)
+    monkeypatch.setattr(module, "present_model", present)
+    monkeypatch.setattr(module, "linear_model", made)
     monkeypatch.setattr(module, "_is_short", lambda *_: False)
     monkeypatch.setattr(module, "_settling", lambda step: np.zeros(0, dtype=np.intp))
     monkeypatch.setattr(module, "_is_cut", lambda *_: True)
@@ -394,5 +398,5 @@ def test_a_strong_effect_whose_columns_follow_the_estimate_settles() -> None:
 @pytest.mark.parametrize(("left", "sign"), [(100.0, -1.0), (0.5, 1.0)])
 def test_a_way_that_promises_nothing_is_judged_without_overflow(left: float, sign: float):
     before = SimpleNamespace(error=np.float64(1.0), gain=lambda _: 0.0)
-    kept = _kept(before, SimpleNamespace(error=np.float64(left)), np.zeros(1))
+    kept = _kept(before, np.float64(left), np.zeros(1))
     assert np.isfinite(kept) and np.sign(kept) == sign
