@@ -19,6 +19,7 @@ from scara_ident.identification.channel_comparison import (
     SIMPLER_SHARE,
     far_less,
     few,
+    first_runs,
     friction_pushes,
     held_out,
     mean,
@@ -70,10 +71,9 @@ def channel_faults(observations: Observations) -> tuple[ChannelFault, ...]:
     tuple of ChannelFault
         To be mended together; empty where nothing else fits better.
     """
-    first = {label: place for place, label in reversed(list(enumerate(observations.data.labels)))}
     # Hundreds of small fits: on products of such columns two threads of BLAS take ten times as long as one.
     with one_blas_thread():
-        return _faults(observations.of(sorted(first.values())))
+        return _faults(first_runs(observations))
 
 
 def _faults(held: Observations) -> tuple[ChannelFault, ...]:

@@ -33,6 +33,12 @@ PUSHING_STD = 4.0
 ROUNDING = 1e-12
 
 
+def first_runs(observations: Observations) -> Observations:
+    """Return the first run of every trajectory: what a channel is read as shows in each alike."""
+    first = {label: place for place, label in reversed(list(enumerate(observations.data.labels)))}
+    return observations.of(sorted(first.values()))
+
+
 def few(observations: Observations) -> bool:
     """Tell whether a joint has too few rows for its fit to say anything."""
     return any(0 < rows.table.shape[1] < ENOUGH_ROWS * len(rows.columns) for rows in observations.joints)

@@ -6,19 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from scara_ident.arrays import Array
+from scara_ident.estimation.joint_scales import joint_scales
 from scara_ident.estimation.least_squares import weighted_value
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.identification.channel_check import NARROWED, wide_bands
-from scara_ident.identification.channel_comparison import far_less, few, held_out, relative
+from scara_ident.identification.channel_comparison import far_less, few, first_runs, held_out, relative
 from scara_ident.identification.channel_fault import percent
-from scara_ident.model.urdf_values import urdf_values
 from scara_ident.threads import one_blas_thread
 
 # Units differ by more than this factor, which is what an effect of the torque's scale is looked for within.
 OTHER_UNIT = 2.0
-# The URDF's torque tells the scale of a joint where it leaves less than this share of what friction and a rotor alone leave.
-MAX_UNEXPLAINED = 0.35
 
 
 def gain_said(observations: Observations) -> str | None:
@@ -33,9 +30,8 @@ def gain_said(observations: Observations) -> str | None:
     observations : Observations
         The first run of every trajectory is used.
     """
-    first = {label: place for place, label in reversed(list(enumerate(observations.data.labels)))}
     with one_blas_thread():
-        held = observations.of(sorted(first.values()))
+        held = first_runs(observations)
         poor = relative(weighted_value(held.by_joint), held) > NARROWED
         if not np.any(poor):
             return None
@@ -43,7 +39,7 @@ def gain_said(observations: Observations) -> str | None:
         held = observe(held.model, held.data.at(wide_bands(held)))
         if few(held):
             return None
-        scales = _scales(held)
+        scales = joint_scales(held)
         usual = float(np.median(list(scales.values()))) if scales else 0.0
         factors = {j: usual / scale for j, scale in scales.items() if not _same(usual / scale)}
         # Of two joints either may be the one that is wrong.
@@ -79,27 +75,3 @@ def _times(held: Observations, factors: dict[int, float]) -> Observations:
     ]
     joints = tuple(replace(rows, table=table) for rows, table in zip(held.joints, tables, strict=True))
     return replace(held, joints=joints)
-
-
-def _scales(held: Observations) -> dict[int, float]:
-    """Return the effort of each joint as a multiple of the torque of the URDF's bodies, where these explain it."""
-    model = held.model
-    stated = urdf_values(model)
-    rigid = model.place(model.rigid_body)
-    found: dict[int, float] = {}
-    for j, rows in enumerate(held.joints):
-        bodies = (rows.columns >= rigid.start) & (rows.columns < rigid.stop) & np.isfinite(stated[rows.columns])
-        columns, torque = rows.table[:-1], rows.table[-1]
-        nominal = stated[rows.columns[bodies]] @ columns[bodies]
-        alone = columns[(rows.columns < rigid.start) | (rows.columns >= rigid.stop)]
-        if not np.any(nominal):
-            continue
-        whole = np.vstack([alone, nominal])
-        value = np.linalg.lstsq(whole.T, torque, rcond=None)[0]
-        if value[-1] and _left(whole, torque) < MAX_UNEXPLAINED * _left(alone, torque):
-            found[j] = float(value[-1])
-    return found
-
-
-def _left(columns: Array, torque: Array) -> float:
-    return float(np.linalg.norm(torque - columns.T @ np.linalg.lstsq(columns.T, torque, rcond=None)[0]))

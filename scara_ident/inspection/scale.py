@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from scara_ident.errors import ScaraIdentError
+from scara_ident.estimation.joint_scales import joint_scales
 from scara_ident.estimation.observations import observe
-from scara_ident.model.base_parameters import find_base_parameters
 from scara_ident.model.model import build_model
 from scara_ident.motion.prepared import prepare
 from scara_ident.recording.recording import Recording
@@ -14,8 +12,6 @@ from scara_ident.robot.robot import Robot
 
 # Of both sides of the equation, Hz: gravity and inertia of an arm are below, and no choice is needed for a rough scale.
 BAND = 4.0
-# The URDF's torque tells the scale of a joint where it leaves less than this share of what friction and a rotor alone leave.
-MAX_UNEXPLAINED = 0.35
 # A scale within this factor of 1 is what a URDF with rough masses gives.
 USUAL = 2.0
 # A scale that is larger on every joint is as likely the reduction of a gear in front of which torque was measured: of arms it is 30 and more.
@@ -62,25 +58,6 @@ def scale_note(recording: Recording, robot: Robot) -> str | None:
 
 def _scales(recording: Recording, robot: Robot) -> dict[int, float]:
     """Return the torque per recorded unit of the joints whose rigid-body torque shows in their effort."""
-    model = build_model(robot, "basic")
-    base = find_base_parameters(robot)
-    stated = base.grouping @ robot.standard_parameters()
     bands = [min(BAND, 0.1 * recording.rate)] * robot.n
-    observations = observe(model, prepare([recording], bands))
-    scales = {}
-    for j, rows in enumerate(observations.joints):
-        leads = rows.columns < len(stated)
-        columns, effort = rows.table[:-1], rows.table[-1]
-        own = rows.columns[leads]
-        rigid, friction = stated[own] @ columns[leads], columns[~leads]
-        if not np.any(rigid):
-            continue
-        # A URDF states no rotor, whose inertia may be as large as the links': what the joint's acceleration alone asks for tells no scale.
-        rotor = base.grouping[own, 10 * robot.n + j] @ columns[leads]
-        with_urdf = np.stack([*friction, rotor, rigid], axis=1)
-        value = np.linalg.lstsq(with_urdf, effort, rcond=None)[0]
-        without = np.linalg.lstsq(with_urdf[:, :-1], effort, rcond=None)[0]
-        left = np.linalg.norm(effort - with_urdf @ value)
-        if value[-1] and left < MAX_UNEXPLAINED * np.linalg.norm(effort - with_urdf[:, :-1] @ without):
-            scales[j] = float(1.0 / value[-1])
-    return scales
+    observations = observe(build_model(robot, "basic"), prepare([recording], bands))
+    return {j: 1.0 / scale for j, scale in joint_scales(observations).items()}
