@@ -28,6 +28,8 @@ PROBE = 4096
 LONGEST_SLUG = 200
 # What is still being written: whose it is, so that what a killed run has left can be distinguished from what another run writes.
 UNFINISHED = ".scara-ident"
+# Bytes of no text in an encoding of one byte a letter, but tabs and ends of lines; UTF-16 has a 0 in every other byte.
+_NO_TEXT = re.compile(rb"[\x00-\x08\x0e-\x1f]")
 _KINDS = (
     (stat.S_ISFIFO, "a named pipe"),
     (stat.S_ISCHR, "a device"),
@@ -348,3 +350,18 @@ def plain(value: Any) -> Any:
     if isinstance(value, (float, np.floating)):
         return float(value) if np.isfinite(value) else None
     return value
+
+
+def foreign_letter(content: bytes) -> str | None:
+    """Say which letter of a text is in another encoding than UTF-8, in which line, and what to do; None where there is none.
+
+    None too of bytes that no text has, as of UTF-16 or a compressed file.
+    """
+    try:
+        content.decode("utf-8")
+    except UnicodeDecodeError as error:
+        letter = content[error.start : error.start + 1].decode("cp1252", errors="ignore")
+        if letter and not _NO_TEXT.search(content):
+            line = content.count(b"\n", 0, error.start) + 1
+            return f"line {line}: a letter that is not in UTF-8, {letter!r} if it is in Windows-1252; save the file in UTF-8"
+    return None

@@ -17,6 +17,7 @@ from scara_ident.errors import ScaraIdentError
 from scara_ident.files import (
     _unfinished,
     check_output,
+    foreign_letter,
     path_fault,
     plain,
     real_path,
@@ -199,3 +200,11 @@ def test_a_pipe_a_device_and_a_socket_are_no_files(tmp_path: Path):
     assert "link: is a device" in str(path_fault(link))
     (tmp_path / "file").touch()
     assert [path_fault(tmp_path / name) for name in ("file", "missing", ".")] == [None] * 3
+
+
+def test_a_letter_in_another_encoding_is_told_from_bytes_of_no_text():
+    said = foreign_letter("eins\nzwei\nfür drei".encode("latin-1"))
+    assert said == "line 3: a letter that is not in UTF-8, 'ü' if it is in Windows-1252; save the file in UTF-8"
+    assert foreign_letter("für".encode()) is None
+    assert foreign_letter("für".encode("utf-16")) is None
+    assert foreign_letter(bytes(range(256))) is None

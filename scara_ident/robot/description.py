@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -20,15 +19,13 @@ from pydantic import (
 )
 
 from scara_ident.errors import NoRobotError, RobotError
-from scara_ident.files import path_fault, real_path
+from scara_ident.files import foreign_letter, path_fault, real_path
 from scara_ident.robot.examples import example_urdf, is_name
 
 # Sizes that a factor of a drive or a channel may have.
 MIN_FACTOR, MAX_FACTOR = 1e-12, 1e12
 # Characters of a robot.yaml, and nodes of it with its aliases written out.
 MAX_CHARACTERS = 1_000_000
-# Bytes of no text in an encoding of one byte a letter, but tabs and ends of lines; UTF-16 has a 0 in every other byte.
-_NO_TEXT = re.compile(rb"[\x00-\x08\x0e-\x1f]")
 # What the key urdf takes.
 URDF = "the path of a URDF, or the name of a robot of example-robot-data"
 
@@ -265,15 +262,8 @@ def read_description(path: Path) -> RobotDescription:
 def _not_utf_8(path: Path) -> str:
     """Say which letter of a file is in another encoding, and where; that it is no text where it has bytes that no text has."""
     with path.open("rb") as file:
-        content = file.read(MAX_CHARACTERS)
-    try:
-        content.decode("utf-8")
-    except UnicodeDecodeError as error:
-        letter = content[error.start : error.start + 1].decode("cp1252", errors="ignore")
-        if letter and not _NO_TEXT.search(content):
-            line = content.count(b"\n", 0, error.start) + 1
-            return f", line {line}: a letter that is not in UTF-8, {letter!r} if it is in Windows-1252; save the file in UTF-8"
-    return ": not a text file in UTF-8; expected a robot.yaml"
+        letter = foreign_letter(file.read(MAX_CHARACTERS))
+    return f", {letter}" if letter else ": not a text file in UTF-8; expected a robot.yaml"
 
 
 def _size(node: Any, known: dict[int, float]) -> float:

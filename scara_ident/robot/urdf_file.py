@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 import pinocchio as pin
 
 from scara_ident.errors import NoRobotError, RobotError
-from scara_ident.files import path_fault, real_path
+from scara_ident.files import foreign_letter, path_fault, real_path
 from scara_ident.quiet import quiet_stderr
 from scara_ident.robot.urdf_validation import XACRO, urdf_fault
 
@@ -42,6 +42,8 @@ def read_urdf(urdf: Path, source: Path) -> ElementTree.Element:
     except OSError as error:
         raise RobotError(f"{source}: urdf: cannot read {urdf}: {error.strerror}") from None
     except ElementTree.ParseError as error:
+        if (letter := foreign_letter(urdf.read_bytes())) is not None:
+            raise RobotError(f"{urdf}, {letter}") from None
         hint = f"; if it is xacro's, {XACRO}" if "unbound prefix" in str(error) else ""
         raise RobotError(f"{urdf}: not well-formed XML: {error}{hint}") from None
     except (LookupError, ValueError) as error:

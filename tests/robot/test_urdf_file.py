@@ -33,6 +33,21 @@ def test_what_is_none_is_refused_in_one_line(tmp_path: Path, text: str, said: st
         read_urdf(tmp_path / "none.urdf", tmp_path / "robot.yaml")
 
 
+def test_a_letter_in_another_encoding_is_named_with_its_line(tmp_path: Path) -> None:
+    """It was said to be not well-formed XML."""
+    text = embedded_urdf().read_text(encoding="utf-8").replace("</robot>", "<!-- für den Prüfstand -->\n</robot>")
+    urdf, line = tmp_path / "arm.urdf", text[: text.index("für")].count("\n") + 1
+    urdf.write_bytes(text.encode("latin-1", errors="replace"))
+    with pytest.raises(RobotError) as caught:
+        read_urdf(urdf, urdf)
+    assert str(caught.value) == (
+        f"{urdf}, line {line}: a letter that is not in UTF-8, 'ü' if it is in Windows-1252; save the file in UTF-8"
+    )
+    # Where the first line says so it is no fault.
+    urdf.write_bytes(text.replace('encoding="utf-8"', 'encoding="ISO-8859-1"', 1).encode("latin-1", errors="replace"))
+    assert pinocchio_model(urdf, read_urdf(urdf, urdf)).nv == 3
+
+
 def test_the_namespace_of_a_schema_is_passed_over(tmp_path: Path) -> None:
     """Drake's own URDFs name one, and were refused as having no <robot>."""
     text = embedded_urdf().read_text(encoding="utf-8")
