@@ -190,12 +190,8 @@ def linearise(step: SelectionStep) -> Linearised:
 def linear_model(present: PresentModel) -> Linearised:
     """Return the model at its present nonlinear parameters as one that is linear about them."""
     step, scene, chosen, unknowns = present.step, present.scene, present.chosen, present.unknowns
-    joints, columns, linear, total = (
-        present.joints,
-        step.columns,
-        present.linear,
-        present.linear + len(present.unknowns),
-    )
+    columns, joints = step.columns, present.joints
+    linear, total = present.linear, present.linear + len(unknowns)
     slopes: dict[int, Rows] = {}
     rows = []
     for owner, (candidate, tie) in enumerate(zip(chosen, present.ties, strict=True)):
