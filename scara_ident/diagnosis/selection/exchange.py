@@ -13,6 +13,7 @@ from scara_ident.diagnosis.checks.same_errors import ROUNDING, same
 from scara_ident.diagnosis.fitting.interval_fit import refined
 from scara_ident.diagnosis.fitting.nonlinear_fit import tune
 from scara_ident.diagnosis.selection.choice import fitted_beside, fitted_with, objection
+from scara_ident.diagnosis.selection.of_all_joints import takes_in
 from scara_ident.diagnosis.testing.acceptance import Decision
 from scara_ident.diagnosis.testing.candidate_tests import held_out_gains
 from scara_ident.diagnosis.testing.selection_step import SelectionStep, best_of_each
@@ -26,12 +27,12 @@ DROPPED = "it was found, and beside the others as fitted with it it was no longe
 
 @dataclass(frozen=True, eq=False)
 class Exchange:
-    """An effect in the place of another.
+    """An effect in the place of another, or of the same on single joints.
 
     Attributes
     ----------
-    place : int
-        Index of the removed effect, among those chosen.
+    places : tuple of int
+        Indices of the removed effects, among those chosen.
     decision : Decision
         Decision on the new effect.
     scene : Scene
@@ -40,14 +41,18 @@ class Exchange:
         Reduction of the weighted squared residual.
     """
 
-    place: int
+    places: tuple[int, ...]
     decision: Decision
     scene: Scene
     saved: float
 
 
 def best_exchange(
-    step: SelectionStep, pool: Sequence[Candidate], first: Scene, refused: Collection[str] = ()
+    step: SelectionStep,
+    pool: Sequence[Candidate],
+    first: Scene,
+    without: Collection[str] = (),
+    refused: Collection[str] = (),
 ) -> Exchange | None:
     """Return the exchange with the largest improvement, or as good with fewer effects, everything else fitted again; None if there is none.
 
@@ -59,11 +64,13 @@ def best_exchange(
         All candidates that may replace an effect.
     first : Scene
         Where the columns of the pool are at hand.
-    refused : collection of str, optional
+    without : collection of str, optional
         Labels of effects that must not be tried.
+    refused : collection of str, optional
+        Labels of those that have an objection beside the effects chosen.
     """
     found = []
-    held = {item.label(step.scene) for item in step.chosen} | set(refused)
+    held = {item.label(step.scene) for item in step.chosen} | {*without, *refused}
     able = [item for item in pool if not item.corrects_data and item.label(step.scene) not in held]
     count = cache(lambda: len(needed(step)))
     for place, item in enumerate(step.chosen):
@@ -77,8 +84,32 @@ def best_exchange(
             # Of two that explain as much, the one that needs fewer others is the better explanation.
             better = _fewer(count, other, decision) if alike else saved > 0.0
             if better and objection(other, decision) is None:
-                found.append(Exchange(place, decision, other.scene, saved))
+                found.append(Exchange((place,), decision, other.scene, saved))
+    found += _of_all_joints(step, pool, without)
     return max(found, key=lambda each: each.saved, default=None)
+
+
+def _of_all_joints(step: SelectionStep, pool: Sequence[Candidate], without: Collection[str]) -> list[Exchange]:
+    """Return what corrects the data of all joints in the place of the same effect on all single joints that have it.
+
+    Where it explains as much as several of them do, they differ by no more than chance. That beside them it may have been
+    refused says nothing of it: it is then asked only what they leave. What each recording has of its own is judged on other
+    held-out data, and cannot be compared.
+    """
+    found = []
+    for whole in pool:
+        places = tuple(place for place, item in enumerate(step.chosen) if takes_in(whole, item))
+        if not places or whole.effect.of_each_recording or whole.label(step.scene) in without:
+            continue
+        last = step.without(places[-1])
+        beside = replace(step, chosen=tuple(item for place, item in enumerate(step.chosen) if place not in places))
+        (own,), (decision,) = last.judge([step.chosen[places[-1]]]), beside.judge([whole])
+        saved = float(np.sum(own.examination.left) - np.sum(decision.examination.left))
+        alike = same((last, own), (beside, decision))
+        better = len(places) > 1 if alike else saved > 0.0
+        if decision.accepted and better and objection(beside, decision) is None:
+            found.append(Exchange(places, decision, beside.scene, saved))
+    return found
 
 
 def needed(step: SelectionStep) -> tuple[Candidate, ...]:

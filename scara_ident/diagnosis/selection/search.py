@@ -271,12 +271,12 @@ def _searched(
         if winner is None:
             # Each exchange explains more, or as much with fewer effects, so the loop ends; this is a limit in any case.
             free = state.exchanges < len(state.steps)
-            swap = best_exchange(step, state.pool, base.first, (*without, *refused)) if free else None
+            swap = best_exchange(step, state.pool, base.first, without, refused) if free else None
             if swap is None:
                 break
-            winner, scene, gone = swap.decision, swap.scene, swap.place
+            winner, scene, gone = swap.decision, swap.scene, swap.places
         passed = (*passed, (winner.label, state.to_go_back_to(winner)))
-        state = (state if gone is None else state.giving_way(gone)).at(scene).with_effect(winner)
+        state = (state if gone is None else state.giving_way(*gone)).at(scene).with_effect(winner)
     if state.correction is not None:
         # Effects accepted since then had changed it.
         state = state.corrected(state.correction.candidate)

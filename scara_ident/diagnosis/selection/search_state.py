@@ -11,6 +11,7 @@ from scara_ident.diagnosis.checks.other_minima import lowest
 from scara_ident.diagnosis.fitting.at_estimate import at_estimate
 from scara_ident.diagnosis.fitting.correction import Correction, taken_out
 from scara_ident.diagnosis.fitting.interval_fit import refined
+from scara_ident.diagnosis.selection.of_all_joints import takes_in
 from scara_ident.diagnosis.testing.acceptance import Decision
 from scara_ident.diagnosis.testing.selection_step import SelectionStep, moved_together, observed
 from scara_ident.effects import Scene
@@ -122,25 +123,36 @@ class SearchState:
         kept = tuple(item for item in self.candidates if item.label(self.step.scene) not in without)
         return replace(self, candidates=kept)
 
-    def giving_way(self, place: int) -> SearchState:
-        """Return the state without one of the effects chosen, whose family may come in again."""
+    def giving_way(self, *places: int) -> SearchState:
+        """Return the state without some of the effects chosen, in whose place one comes; their families may come in again."""
         scene = self.step.scene
-        gone = self.step.chosen[place].label(scene)
-        back = [item for item in self.pool if item.label(scene) == gone]
-        chosen = tuple(item for item in self.step.chosen if item.label(scene) != gone)
+        gone = {self.step.chosen[place].label(scene) for place in places}
+        back = [item for item in self.pool if item.label(scene) in gone]
+        chosen = tuple(item for item in self.step.chosen if item.label(scene) not in gone)
         return replace(
             self,
             step=replace(self.step, chosen=chosen),
-            steps=tuple(item for item in self.steps if item.decision.label != gone),
+            steps=tuple(item for item in self.steps if item.decision.label not in gone),
             candidates=(*self.candidates, *back),
             exchanges=self.exchanges + 1,
         )
+
+    def without_its_like(self, winner: Decision) -> SearchState:
+        """Return the state without the same effect of single joints, in whose place one of all joints comes into it.
+
+        Beside it they would only say again, for each joint, what all have alike. They come in again by what they differ
+        from it. What is left of a correction was found beside them and takes the place of none.
+        """
+        if any(item.decision.label == winner.label for item in self.steps):
+            return self
+        places = [k for k, item in enumerate(self.step.chosen) if takes_in(winner.candidate, item)]
+        return replace(self.giving_way(*places), exchanges=self.exchanges)
 
     def with_effect(self, winner: Decision) -> SearchState:
         """Return the state with an effect in the model, or out of the data, and all fitted again."""
         candidate, state = winner.candidate, self
         if candidate.corrects_data:
-            state = state.corrected(candidate)
+            state = state.without_its_like(winner).corrected(candidate)
         else:
             rest = None if candidate == state.step.rest else state.step.rest
             state = replace(state, step=replace(state.step, chosen=(*state.step.chosen, candidate), rest=rest))
@@ -155,8 +167,8 @@ class SearchState:
         step = replace(step, scene=at_estimate(step.scene, step.chosen, value), weights=weights)
         left = rms_of(value, fitted, step.offsets)
         came = Step(winner, step.scene, step.chosen, step.observations.data, value, left)
-        repeated = bool(self.steps) and self.steps[-1].decision.label == winner.label
-        return replace(state, step=step, value=value, steps=(*self.steps[: len(self.steps) - repeated], came))
+        repeated = bool(state.steps) and state.steps[-1].decision.label == winner.label
+        return replace(state, step=step, value=value, steps=(*state.steps[: len(state.steps) - repeated], came))
 
     def corrected(self, candidate: Candidate) -> SearchState:
         """Return the state with an effect taken out of the data, beside what was taken out of them before."""

@@ -12,7 +12,7 @@ from scara_ident.diagnosis.checks.same_errors import same
 from scara_ident.diagnosis.selection.exchange import best_exchange, near_in_place, needed, without_superfluous
 from scara_ident.effects import Member
 from scara_ident.effects.friction import AsymmetricFriction, Stribeck
-from scara_ident.effects.measurement import TimeDelay
+from scara_ident.effects.measurement import TimeDelay, shifted
 from scara_ident.effects.position import Spring
 from tests.diagnosis.made import Bent, Bump, exact_runs, searched, step_beside, with_torque
 
@@ -54,12 +54,40 @@ def test_what_stood_for_two_effects_goes_once_one_of_them_is_in(runs):
 def test_the_exchange_says_what_it_saves_and_where_to_go_on(runs):
     step = step_beside(runs, [SPRING, MIXTURE])
     found = best_exchange(step, [SPRING, MIXTURE, ASYMMETRIC, Candidate(TimeDelay(), Member(None))], step.scene)
-    assert (found.place, found.decision.label) == (1, "asymmetric_friction of joint1")
+    assert (found.places, found.decision.label) == ((1,), "asymmetric_friction of joint1")
     right = replace(step, chosen=(SPRING, ASYMMETRIC))
     assert found.saved == pytest.approx(float(np.sum(step.model.squares) - np.sum(right.model.squares)), rel=1e-6)
     # The weights are those of a model without either: all but the noise's share of what was left is gone.
     assert best_exchange(right, [SPRING, MIXTURE, ASYMMETRIC], step.scene) is None
     assert best_exchange(step, [SPRING, MIXTURE, ASYMMETRIC], step.scene, ["asymmetric_friction of joint1"]) is None
+
+
+WHOLE, *SINGLE = (Candidate(TimeDelay(), Member(joint)) for joint in (None, 0, 1))
+
+
+def late(*delays: float):
+    """Return runs whose joints' efforts are so late, s."""
+    runs = exact_runs()
+    for joint, delay in enumerate(delays):
+        runs = [shifted(run, -delay, [joint]) for run in runs]
+    return runs
+
+
+def test_a_delay_of_all_joints_takes_the_place_of_those_of_single_ones_that_agree():
+    for chosen in (SINGLE, SINGLE[:1]):
+        step = step_beside(late(0.006, 0.006), chosen)
+        found = best_exchange(step, [WHOLE, *SINGLE], step.scene)
+        assert (found.decision.candidate, found.places) == (WHOLE, tuple(range(len(chosen))))
+        # Beside that of a joint it may have been refused, as what the other joint lacks alone.
+        found = best_exchange(step, [WHOLE, *SINGLE], step.scene, refused=["time_delay"])
+        assert found.decision.candidate == WHOLE
+        assert best_exchange(step, [WHOLE, *SINGLE], step.scene, without=["time_delay"]) is None
+
+
+def test_joints_with_different_delays_keep_them():
+    for delays, chosen in (((0.009, 0.004), SINGLE), ((0.006, 0.0), SINGLE[:1])):
+        step = step_beside(late(*delays), chosen)
+        assert best_exchange(step, [WHOLE, *chosen], step.scene) is None
 
 
 def test_what_does_as_well_or_comes_nowhere_near_takes_no_place():
@@ -159,6 +187,6 @@ def test_what_does_as_well_with_fewer_others_takes_the_place():
     assert same((beside, own), (beside, spring))
     assert len(needed(step)) == 3
     found = best_exchange(step, [SPRING], step.scene)
-    assert (found.place, found.decision.label) == (0, "spring of joint1")
+    assert (found.places, found.decision.label) == ((0,), "spring of joint1")
     # Beside two that are both needed with either, it would change nothing.
     assert best_exchange(step_beside(runs, [wrong, mends]), [SPRING], step.scene) is None

@@ -106,6 +106,24 @@ def test_a_delay_is_taken_out_of_the_data_and_its_sizes_add_up():
     assert whole.value[0] == pytest.approx(first.value[0] + after.correction.value[0], rel=1e-2)
 
 
+def test_a_delay_of_all_joints_takes_the_place_of_those_of_single_ones_which_may_come_in_again():
+    runs = [shifted(run, -0.004) for run in sprung(exact_runs())]
+    state = begun(runs, TimeDelay(), Spring())
+    whole = next(item for item in state.step.judge(state.candidates) if item.label == "time_delay")
+    for label in ("time_delay of joint1", "spring of joint2", "time_delay of joint2"):
+        state = let_in(state, label)
+    after = state.with_effect(whole)
+    assert after.labels == {"spring of joint2"}
+    assert [step.decision.label for step in after.steps] == ["spring of joint2", "time_delay"]
+    assert {"time_delay of joint1", "time_delay of joint2"} <= set(labels(after, after.candidates))
+    assert after.correction.value[0] == pytest.approx(0.004, abs=2e-4)
+    # Nothing was exchanged: that many may be is another question.
+    assert after.exchanges == 0
+    # What is left of a correction was found beside what joints differ by, and takes the place of none.
+    again = let_in(after, "time_delay of joint1").with_effect(whole)
+    assert again.labels == {"spring of joint2", "time_delay of joint1"}
+
+
 def filtered(runs, time_constant: float = 0.008):
     return [
         replace(
