@@ -106,7 +106,7 @@ def test_a_description_is_refused_in_a_line(command, here: Path, text: str):
     [
         ("klingon.urdf", b"<?xml version='1.0' encoding='klingon'?><robot/>", "unknown encoding: klingon); save it in UTF-8"),
         ("seven.urdf", b"<?xml version='1.0' encoding='utf-7'?><robot/>", "multi-byte encodings are not supported); save"),
-        ("latin.urdf", "<robot name='é'/>".encode("latin-1"), "latin.urdf: not well-formed XML: not well-formed"),
+        ("latin.urdf", "<robot name='é'/>".encode("latin-1"), "latin.urdf, line 1: a letter that is not in UTF-8, 'é' if"),
         ("part.urdf", b"<robot><xacro:property/></robot>", "unbound prefix: line 1, column 7; if it is xacro's, run xacro"),
         ("arm.xacro", b"<robot/>", "arm.xacro: is xacro's; run xacro first and give what it writes"),
         ("mass.urdf", urdf('<mass value="20"', '<mass value="5kg"').encode(), "mass.urdf: not a usable URDF: link 'link1': value of"),

@@ -340,12 +340,10 @@ def test_a_freed_model_leaves_nothing_that_its_nonlinear_parameters_could_take_u
 
 def test_a_coarse_fit_goes_on_where_a_step_was_cut_short_that_the_model_promises_more_of(monkeypatch) -> None:
     """One of two gears stayed near a damping ratio of 0.3 that it passed on its way to 0.02, and was refused there."""
-    errors, promised = iter([100.0, 99.5, 99.0, 98.9]), iter([0.5, 0.5, 0.01, 0.0])
-    seen = []
+    errors, promised, seen = iter([100.0, 99.5, 99.0, 98.9]), iter([0.5, 0.5, 0.01, 0.0]), list[float]()
 
     def present(step: SelectionStep) -> SimpleNamespace:
-        seen.append(next(errors))
-        return SimpleNamespace(error=seen[-1])
+        return SimpleNamespace(error=seen.append(next(errors)) or seen[-1])
 
     def made(present: SimpleNamespace) -> SimpleNamespace:
         own = next(promised)
