@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 from virtual_motions import RATE, random_motion, ranges
-from virtual_sets import _random_effect
+from virtual_sets import random_effect
 
 from scara_ident.diagnosis import Diagnosis, diagnose
 from scara_ident.diagnosis.candidates.candidates import CandidateColumns
@@ -210,7 +210,7 @@ def one_set(
     arm = virtual_arm(robot_named(robot))
     pair = PAIRS[number % len(PAIRS)]
     name = pair[(number // len(PAIRS)) % 2]
-    truth = _random_effect(name, float(np.exp(rng.uniform(*np.log(LARGER if tight else FACTORS)))), arm, rng)
+    truth = random_effect(name, float(np.exp(rng.uniform(*np.log(LARGER if tight else FACTORS)))), arm, rng)
     motion = poor_motion(arm, rng)
     begun = [record(arm, motion, truth, number, run) for run in (1, 2)]
     first = diagnose(arm.robot, begun)

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 from virtual_conditions import Asked
-from virtual_sets import _random_effect, random_arm, simulate_set
+from virtual_sets import random_arm, random_effect, simulate_set
 
 from scara_ident import diagnose
 from scara_ident.errors import ScaraIdentError
@@ -86,7 +86,7 @@ def found_of(seed: int, asking: Asking) -> tuple[Found, Found, str]:
         arm, _ = random_arm(asking.robot, stated=True, bits=BITS, folder=Path(place), rng=rng)
         joint, other = (str(rng.choice(arm.robot.joints)) for _ in range(2))
         effects: list[Effect] = [TimeDelay(joint if asking.joint else None, delay=delay)]
-        effects += [replace(_random_effect(str(name), FACTOR, arm, rng), joint=other) for name in names]
+        effects += [replace(random_effect(str(name), FACTOR, arm, rng), joint=other) for name in names]
         asked = Asked(varied=asking.varied, rate=rate, recordings=int(rng.integers(3, 6)), duration=DURATION)
         made = simulate_set("pair", seed, asking.robot, Path(place) / "set", asked, effects)
         result = diagnose(made.robot, made.training, validation=made.held_out)

@@ -203,12 +203,13 @@ def pick_effects(kind: str, arm: VirtualArm, rng: np.random.Generator) -> tuple[
     effects, factors = [], []
     for name in names:
         factor = float(np.exp(rng.uniform(*np.log(FACTORS)))) if kind not in SEVERAL else FACTOR_OF_SEVERAL
-        effects.append(_random_effect(name, factor, arm, rng))
+        effects.append(random_effect(name, factor, arm, rng))
         factors.append(factor)
     return effects, factors
 
 
-def _random_effect(name: str, factor: float, arm: VirtualArm, rng: np.random.Generator) -> Effect:
+def random_effect(name: str, factor: float, arm: VirtualArm, rng: np.random.Generator) -> Effect:
+    """Draw an effect of a kind, of a factor times its usual size, on any joint that may have it."""
     joint = None if name in WHOLE_ARM else str(rng.choice(arm.robot.joints))
     if arm.robot.n < 2 and name in OF_TWO_JOINTS:
         raise UsageError(f"{name}: {arm.robot.name} has one joint; it needs two")
