@@ -1,8 +1,8 @@
 """How long `diagnose` takes, and how much memory, of an arm in space with several elastic gears.
 
-A virtual arm of six joints stands on a tilted base, and the gears of some of its joints are elastic, as stiff as those of strain
-waves or softer. It is recorded a few times in wandering motions of its own, of which the last is held out. Each run is a process
-of its own, so that its largest memory is that of the diagnosis.
+A virtual arm of six joints stands on a tilted base, and the gears of some of its joints are elastic. It is recorded a few times
+in wandering motions of its own, of which the last is held out. Each run is a process of its own, so that its largest memory is
+that of the diagnosis.
 
     python benchmarks/elastic_arm.py --seconds 15
 """
@@ -23,7 +23,7 @@ from scara_ident import diagnose, parse_effect, simulate, virtual_arm
 from scara_ident.robot.robot import load_robot
 
 RUNS, RATE = 5, 1000.0
-# Stiffness of the elastic gears, N m/rad, from the shoulder on: behind their motors that are held the links swing at 6 to 20 Hz.
+# Stiffness of the elastic gears, N m/rad, from the shoulder on: soft enough that all of them are found.
 STIFFNESS = {"shoulder_lift_joint": 9000.0, "elbow_joint": 5000.0, "wrist_1_joint": 900.0}
 TILT = "base_tilt:tilt_x=0.02,tilt_y=-0.015"
 
