@@ -11,6 +11,7 @@ from scara_ident.arrays import Array
 from scara_ident.effects.filters.filter_rest import FilterRest
 from scara_ident.effects.following import EstimateSlopes
 from scara_ident.effects.friction import friction_places
+from scara_ident.effects.links import shared
 from scara_ident.effects.parameters import Member
 from scara_ident.effects.signals import Signals
 from scara_ident.motion.low_pass import HIGHEST_CUT
@@ -48,14 +49,17 @@ class PositionFilter(FilterRest):
 
     def estimate_slopes(self, signals: Signals, member: Member, value: Array) -> EstimateSlopes:
         """Return those of the base model's columns: how links lag by other bodies is small beside it."""
-        laws = list(self._changed(signals))
         return {
-            joint: (signals.scene.model.active[joint], np.tensordot(value, [law[joint] for law in laws], axes=1))
-            for joint in self.rows(signals.scene, member)
+            joint: (signals.scene.model.active[joint], sum(x * own for x, own in zip(value.tolist(), each, strict=True)))
+            for joint, each in enumerate(zip(*self._changed(signals), strict=True))
         }
 
-    def _changed(self, signals: Signals) -> Iterator[list[Array]]:
-        """Give for each law the change of the base model's columns, as `Signals.columns`."""
+    def _changed(self, signals: Signals) -> list[list[Array]]:
+        """Return for each law the change of the base model's columns, as `Signals.columns`; it follows from no estimate."""
+        key = ("position filter", self.delay, _cut(signals), signals.scene.model)
+        return shared(signals.motion, key, lambda: list(self._made_changes(signals)))
+
+    def _made_changes(self, signals: Signals) -> Iterator[list[Array]]:
         motion, scene = signals.motion, signals.scene
         parts = (motion.q, motion.v, motion.a)
         coulomb = [friction_places(scene, joint).get(0, -1) for joint in range(scene.robot.n)]
