@@ -164,6 +164,7 @@ def _found(effect: Item) -> Item:
         "p_value": effect["p_value"],
         "gain": effect["gain"],
         "held_out": effect["held_out"],
+        "size_determined": effect["size_determined"],
     }
 
 
