@@ -9,10 +9,9 @@ from dataclasses import dataclass, replace
 from numpy.typing import ArrayLike
 
 from scara_ident.arrays import Array
-from scara_ident.diagnosis.checks.other_laws import parameters_of_laws
 from scara_ident.diagnosis.criteria import CRITERIA, SelectionCriteria
 from scara_ident.diagnosis.evidence.evidence import Evidence
-from scara_ident.diagnosis.evidence.outcome import Outcome, Unexplained
+from scara_ident.diagnosis.evidence.outcome import Outcome, Unexplained, with_parameters
 from scara_ident.diagnosis.evidence.standing_lines import standing_lines, tentative_lines
 from scara_ident.diagnosis.fitting.effect_parameters import PhysicalParameters, RotorInertia, physical_parameters
 from scara_ident.diagnosis.found_effect import (
@@ -30,7 +29,6 @@ from scara_ident.diagnosis.selection.search import Search, SearchTask
 from scara_ident.diagnosis.selection.tentative import TentativeEffect, tentative_effects
 from scara_ident.diagnosis.testing.lack_of_fit import LackOfFit
 from scara_ident.diagnosis.testing.screening import Dependence
-from scara_ident.diagnosis.testing.selection_step import SelectionStep
 from scara_ident.diagnosis.verdict import Verdict, verdict_of, weighed_evidence
 from scara_ident.diagnosis.whole_estimate import with_whole_estimate
 from scara_ident.diagnosis.work import first, searching
@@ -253,17 +251,19 @@ def diagnose(
     task = SearchTask(base, families, criteria, searching(work, band_given=given), chosen)
     outcome, events = _without_events(task, observations, free=not given)
     reported = outcome if given else below_position_noise(task, outcome)
+    elsewhere = reported is not outcome
     work("comparing the effects found with their alternatives", task.progress.stop)
-    found = reported.search
-    step, whole = replace(found.step, weights=reported.after.weights), _whole(reported)
-    parameters = parameters_of_laws(whole) if whole.chosen else PhysicalParameters()
+    reported = with_parameters(reported)
+    found, parameters = reported.search, reported.parameters
+    assert parameters is not None
+    step = replace(found.step, weights=reported.after.weights)
     groups = confounders(step, found.decisions, found.first, found.doubtful) if found.chosen else []
     final = reported if parameters.linear is None else with_whole_estimate(reported, parameters.linear)
     rows, useless = with_rows(held_out.at(found.bands), found.scene.robot, needed=False)
     held = validated(final, rows)
     # Effects beyond the model keep their values and their bands.
     final = replace(final, search=found)
-    searched, seen = (final, held) if reported is outcome else _where_searched(outcome, held_out)
+    searched, seen = _where_searched(outcome, held_out) if elsewhere else (final, held)
     readings = direct_readings(found, families, criteria.rotor_inertia_std)
     effects = found_effects(found, groups, parameters, readings, held.gains)
     refused = (*outcome.demoted, *outcome.suspected)
@@ -271,7 +271,7 @@ def diagnose(
     notes += [note for note in (*useless, *held.notes) if note not in notes]
     notes += not_found(readings, effects)
     notes += [f"{item.label} is not counted: {item.why}" for item in refused]
-    if reported is not outcome:
+    if elsewhere:
         notes.append(QUIETER.format(found.scene.band, searched.search.scene.band))
     notes += _remarks(final, parameters)
     notes += [event.sentence(robot) for event in events]
@@ -308,19 +308,13 @@ def diagnose(
     )
 
 
-def _whole(outcome: Outcome) -> SelectionStep:
-    """Return the step by which all parameters of an outcome are estimated."""
-    found, after = outcome.search, outcome.after
-    return replace(found.whole(replace(found.step, weights=after.weights)), variation=after.offsets)
-
-
 def _where_searched(outcome: Outcome, held_out: PreparedData) -> tuple[Outcome, Validation]:
     """Return an outcome that was estimated in other bands, at the estimate in its own bands, and what held-out recordings show of it.
 
     Whether the residual is noise is tested in the band that shows most of it, with the estimate that leaves least
     there.
     """
-    linear = physical_parameters(_whole(outcome)).linear
+    linear = physical_parameters(outcome.whole).linear
     assert linear is not None
     final = with_whole_estimate(outcome, linear)
     held = validated(final, with_rows(held_out.at(outcome.search.bands), outcome.search.scene.robot, needed=False)[0])

@@ -11,7 +11,7 @@ from scara_ident.diagnosis.candidates.candidates import Candidate, CandidateColu
 from scara_ident.diagnosis.checks.noise_check import noise_objection
 from scara_ident.diagnosis.checks.other_minima import quieter
 from scara_ident.diagnosis.criteria import SelectionCriteria
-from scara_ident.diagnosis.evidence.outcome import Outcome, outcome_of
+from scara_ident.diagnosis.evidence.outcome import Outcome, outcome_of, undetermined, with_parameters
 from scara_ident.diagnosis.proxies import proxies
 from scara_ident.diagnosis.selection.audit import (
     beaten_by_impossible,
@@ -198,10 +198,13 @@ def _without_proxies(task: SearchTask, found: Outcome) -> Outcome:
         refused = [*proxies(found, task.criteria), *_unstable(found, _others(demoted, found))]
         if not refused:
             bettered = by_better_law(found.search, found.after.weights)
-            if bettered is None:
-                break
-            found = outcome_of(task, bettered)
-            continue
+            if bettered is not None:
+                found = outcome_of(task, bettered)
+                continue
+            found = with_parameters(found)
+            refused = undetermined(found, task.criteria)
+        if not refused:
+            break
         demoted |= {item.label: item for item in reversed(refused)}
         scene = found.search.scene
         instead = {label: pair for label, pair in instead.items() if all(item.label != label for item in refused)}
@@ -212,9 +215,9 @@ def _without_proxies(task: SearchTask, found: Outcome) -> Outcome:
         found = outcome_of(task, again)
     else:
         # No further search, but effects that fail are not believed.
-        while unstable := _unstable(found, _others(demoted, found)):
-            demoted |= {item.label: item for item in unstable}
-            found = outcome_of(task, found.search.without([item.label for item in unstable]))
+        while refused := _failing(found, _others(demoted, found), task.criteria):
+            demoted |= {item.label: item for item in refused}
+            found = outcome_of(task, found.search.without([item.label for item in refused]))
     short = [item.refused(TOO_LITTLE.format(item)) for item in found.hinted]
     return replace(found, demoted=_others(demoted, found), suspected=tuple(short))
 
@@ -223,6 +226,10 @@ def _others(demoted: Mapping[str, Decision], found: Outcome) -> tuple[Decision, 
     """Return those for which no effect of the same name was found instead."""
     chosen = _labels(found.search)
     return tuple(item for item in demoted.values() if item.label not in chosen)
+
+
+def _failing(found: Outcome, demoted: Sequence[Decision], criteria: SelectionCriteria) -> list[Decision]:
+    return _unstable(found, demoted) or undetermined(with_parameters(found), criteria)
 
 
 def _unstable(found: Outcome, demoted: Sequence[Decision]) -> list[Decision]:

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
+from scara_ident.diagnosis.checks.other_laws import parameters_of_laws
 from scara_ident.diagnosis.criteria import SelectionCriteria
 from scara_ident.diagnosis.evidence.evidence import coloured_shares
+from scara_ident.diagnosis.fitting.effect_parameters import PhysicalParameters, size_in_stds
 from scara_ident.diagnosis.selection.audit import suspected
 from scara_ident.diagnosis.selection.search import Search, SearchTask
 from scara_ident.diagnosis.testing.acceptance import Decision
 from scara_ident.diagnosis.testing.lack_of_fit import LackOfFit, lack_of_fit
 from scara_ident.diagnosis.testing.screening import Dependence, screen
-from scara_ident.diagnosis.testing.selection_step import observed_at_every_sample
+from scara_ident.diagnosis.testing.selection_step import SelectionStep, observed_at_every_sample
 from scara_ident.estimation import Estimate, wls
 from scara_ident.estimation.assumed_variation import assumed_variation
 from scara_ident.estimation.least_squares import value_and_weights
@@ -71,6 +73,8 @@ class Outcome:
         On effects that were found and are not believed, with why.
     suspected : tuple of Decision
         On what would be let in beside those that are, did the recordings hold enough of it, with why it is not.
+    parameters : PhysicalParameters or None
+        Of the effects found and what was taken out of the data, as unsure as other laws and fits leave them; see `with_parameters`.
     """
 
     search: Search
@@ -86,11 +90,52 @@ class Outcome:
     repeating: frozenset[str]
     demoted: tuple[Decision, ...] = ()
     suspected: tuple[Decision, ...] = ()
+    parameters: PhysicalParameters | None = None
+
+    @property
+    def whole(self) -> SelectionStep:
+        """The step by which all parameters are estimated: with what was taken out of the data, and the last weights and offsets of runs."""
+        return replace(
+            self.search.whole(replace(self.search.step, weights=self.after.weights)), variation=self.after.offsets
+        )
 
     @cached_property
     def hinted(self) -> Sequence[Decision]:
         """What is suspected beside the effects that stayed, asked for more than once."""
         return suspected(self.search, self.after.weights)
+
+
+def with_parameters(found: Outcome) -> Outcome:
+    """Return an outcome with the physical parameters of what was found."""
+    if found.parameters is not None:
+        return found
+    whole = found.whole
+    return replace(found, parameters=parameters_of_laws(whole) if whole.chosen else PhysicalParameters())
+
+
+def undetermined(found: Outcome, criteria: SelectionCriteria) -> list[Decision]:
+    """Return the decision on the effect whose size is the least determined of those that act together, with the reason; none if all are.
+
+    Other fits of such effects explain as much: one that has no size by them all may only correct what the others, or what a
+    correction of the data leaves, are taken for.
+
+    Parameters
+    ----------
+    found : Outcome
+        With its parameters.
+    """
+    step, parameters = replace(found.search.step, weights=found.after.weights), found.parameters
+    assert parameters is not None
+    sizes = {
+        place: size_in_stds(item.effect, parameters.effects[place])
+        for place, item in enumerate(step.chosen)
+        if item.effect.together
+    }
+    place = min(sizes, key=lambda place: sizes[place], default=-1)
+    if place < 0 or sizes[place] > criteria.min_size:
+        return []
+    (decision,) = step.without(place).judge([step.chosen[place]])
+    return [decision.refused("by other fits that explain as much, its size is within its uncertainty")]
 
 
 def _min_offsets(found: Search, training: Observations) -> RunVariation | None:

@@ -106,9 +106,14 @@ class PhysicalParameters:
 
 def size_is_determined(effect: Effect, parameters: Mapping[str, Parameter], stds: float) -> bool:
     """Whether any of an effect's sizes, its nonlinear parameters left aside, is so many standard deviations from none."""
+    return size_in_stds(effect, parameters) > stds
+
+
+def size_in_stds(effect: Effect, parameters: Mapping[str, Parameter]) -> float:
+    """Return how many standard deviations the best determined of an effect's sizes is from none."""
     others = {"phase", *(parameter.name for parameter in effect.nonlinear)}
-    sizes = [parameter for name, parameter in parameters.items() if name not in others]
-    return any(abs(size.value) > stds * size.std for size in sizes)
+    sizes = [item for name, item in parameters.items() if name not in others and item.value and np.isfinite(item.std)]
+    return max((abs(size.value) / size.std if size.std else np.inf for size in sizes), default=0.0)
 
 
 def physical_parameters(step: SelectionStep, *, of_runs: bool = True, of_noise: bool = True) -> PhysicalParameters:

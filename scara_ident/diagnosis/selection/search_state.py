@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.candidates.candidates import Candidate
 from scara_ident.diagnosis.checks.other_minima import lowest
@@ -174,8 +176,8 @@ class SearchState:
         """Return the state with an effect taken out of the data, beside what was taken out of them before."""
         columns, found = taken_out(self.step, candidate)
         correction = found.beside(self.correction)
-        left = correction.left(self.step.scene)
-        step = replace(self.step, columns=columns, rest=None if left is None else left[0])
+        rest, band = correction.left(self.step.scene) or (None, np.inf)
+        step = replace(self.step, columns=columns, rest=rest, left_band=band)
         return replace(self, step=step, correction=correction).with_rest()
 
     def with_rest(self) -> SearchState:

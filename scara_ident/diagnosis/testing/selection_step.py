@@ -50,6 +50,8 @@ class SelectionStep:
         Differences between runs that all rows treat as noise: their offsets, or all of them.
     rest : Candidate or None
         What may be left in the data after a correction and is not a property of the arm, see `Correction.left`.
+    left_band : float
+        Band, Hz, above which that hides effects of the arm, whether it is in the model or not; infinite if nothing may be left.
     minima : tuple of tuple of Candidate
         Effects that act together, as fitted, and as other fits from other starts have them; empty if there were no
         other fits. See
@@ -64,6 +66,7 @@ class SelectionStep:
     criteria: SelectionCriteria
     variation: RunVariation | None = None
     rest: Candidate | None = None
+    left_band: float = np.inf
     minima: tuple[tuple[Candidate, ...], ...] = ()
 
     def __post_init__(self) -> None:

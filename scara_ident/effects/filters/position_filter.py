@@ -50,7 +50,10 @@ class PositionFilter(FilterRest):
     def estimate_slopes(self, signals: Signals, member: Member, value: Array) -> EstimateSlopes:
         """Return those of the base model's columns: how links lag by other bodies is small beside it."""
         return {
-            joint: (signals.scene.model.active[joint], sum(x * own for x, own in zip(value.tolist(), each, strict=True)))
+            joint: (
+                signals.scene.model.active[joint],
+                sum(x * own for x, own in zip(value.tolist(), each, strict=True)),
+            )
             for joint, each in enumerate(zip(*self._changed(signals), strict=True))
         }
 

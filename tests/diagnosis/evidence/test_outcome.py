@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, fields, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from scara_ident.diagnosis.criteria import CRITERIA
 from scara_ident.diagnosis.evidence.evidence import coloured_shares
-from scara_ident.diagnosis.evidence.outcome import outcome_of
+from scara_ident.diagnosis.evidence.outcome import Outcome, outcome_of, undetermined, with_parameters
+from scara_ident.diagnosis.fitting.effect_parameters import PhysicalParameters
 from scara_ident.diagnosis.selection.search import SearchTask
+from scara_ident.effects import Parameter
 from scara_ident.effects.position import Spring
 from scara_ident.estimation.run_offsets import rms_of
 from tests.diagnosis.made import exact_runs, runs_that_repeat, searched, virtual_runs, with_torque
@@ -92,3 +95,48 @@ def test_steps_of_an_encoder_that_come_again_are_no_remainder(seed: int) -> None
     outcome = selected(runs, Spring(), bands=(15.0, 15.0), free=False)
     assert all(fit.p_value < 1e-4 for fit in outcome.fit_after)
     assert outcome.unexplained is None
+
+
+@pytest.mark.parametrize(
+    ("acting", "refused"), [({"first", "second"}, ["second"]), ({"first"}, ["first"]), ({"sure"}, []), (set(), [])]
+)
+def test_the_least_determined_of_effects_that_act_together_is_refused(acting: set[str], refused: list[str]) -> None:
+    """3680 +- 2540 N m/rad on a rigid joint were `explained`, beside 36,330 +- 18,930 of the joint that had a gear of 12,000."""
+    parameters = {
+        "first": Parameter(36330.0, 18930.0, "N m/rad"),
+        "second": Parameter(3680.0, 2540.0, "N m/rad"),
+        "sure": Parameter(2000.0, 200.0, "N m/rad"),
+    }
+
+    @dataclass(frozen=True)
+    class Step:
+        chosen: tuple[SimpleNamespace, ...]
+        weights: tuple[float, ...] = ()
+
+        def without(self, place: int) -> Step:
+            return replace(self, chosen=(*self.chosen[:place], *self.chosen[place + 1 :]))
+
+        def judge(self, candidates: list[SimpleNamespace]) -> list[SimpleNamespace]:
+            assert all(item not in self.chosen for item in candidates)
+            return [
+                SimpleNamespace(label=item.label, refused=lambda why, item=item: (item.label, why))
+                for item in candidates
+            ]
+
+    chosen = tuple(
+        SimpleNamespace(label=name, effect=SimpleNamespace(together=name in acting, nonlinear=()))
+        for name in parameters
+    )
+    blank = dict.fromkeys((each.name for each in fields(Outcome)), None)
+    found = Outcome(
+        **blank
+        | {
+            "search": SimpleNamespace(step=Step(chosen)),
+            "after": SimpleNamespace(weights=(1.0,)),
+            "parameters": PhysicalParameters(tuple({"stiffness": each} for each in parameters.values())),
+        }
+    )
+    assert with_parameters(found) is found
+    told = undetermined(found, CRITERIA)
+    assert [label for label, _ in told] == refused
+    assert all("other fits that explain as much" in why for _, why in told)

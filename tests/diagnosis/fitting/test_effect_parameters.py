@@ -17,6 +17,7 @@ from scara_ident.diagnosis.fitting.effect_parameters import (
     _physical,
     parameters_beside,
     physical_parameters,
+    size_in_stds,
     size_is_determined,
 )
 from scara_ident.diagnosis.fitting.nonlinear_fit import tune
@@ -199,6 +200,12 @@ def test_coefficients_are_at_least_what_their_uncertainty_leaves():
 def test_a_size_is_determined_where_it_differs_from_none_whatever_the_other_parameters(std: float, told: bool):
     parameters = {"amplitude": Parameter(AMPLITUDE, std, "N m"), "velocity": Parameter(VELOCITY, 0.01, "rad/s")}
     assert size_is_determined(Stribeck(), parameters, 2.5) is told
+    assert size_in_stds(Stribeck(), parameters) == pytest.approx(abs(AMPLITUDE) / std)
+
+
+@pytest.mark.parametrize(("value", "std", "stds"), [(0.0, 0.0, 0.0), (1.0, 0.0, np.inf), (1.0, np.inf, 0.0)])
+def test_a_size_of_nothing_and_one_that_may_be_anything_differ_from_none_by_no_standard_deviation(value, std, stds):
+    assert size_in_stds(Stribeck(), {"amplitude": Parameter(value, std, "N m")}) == stds
 
 
 def fits(robot: Robot, runs: Sequence[Recording], chosen: Candidate, noise: Array, draws: int) -> dict[str, Array]:
