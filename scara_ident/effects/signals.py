@@ -28,8 +28,8 @@ DERIVATIVE_BAND = 3.0
 
 
 @dataclass(frozen=True)
-class LinkTorque:
-    """An effect in a model, of those on links where a scene holds them, with its coefficients, shape (k,), as estimated at present."""
+class ModelledEffect:
+    """An effect in the model with its coefficients, shape (k,), as estimated at present."""
 
     effect: Effect
     member: Member
@@ -63,11 +63,11 @@ class Scene:
         what the estimate leaves room for; nominal for the others.
     columns : Mapping[Motion, tuple of ndarray]
         The base model's columns on motions where they are at hand, see `TorqueModel.joint_columns`.
-    link_torques : tuple of LinkTorque
+    link_torques : tuple of ModelledEffect
         Of the effects in the model beside the base model, which gears transmit too.
     together : tuple of (Effect, Member)
         Effects in the model whose members act together, see `Effect.together`, in the order of their joints.
-    beside : tuple of LinkTorque
+    beside : tuple of ModelledEffect
         All effects in the model, where it is asked whether an arm can have another one beside them.
     """
 
@@ -81,9 +81,9 @@ class Scene:
     start: dict[str, float]
     armatures: Mapping[int, float] = field(default_factory=dict)
     columns: Mapping[Motion, tuple[Array, ...]] = field(default_factory=dict, repr=False)
-    link_torques: tuple[LinkTorque, ...] = ()
+    link_torques: tuple[ModelledEffect, ...] = ()
     together: tuple[tuple[Effect, Member], ...] = ()
-    beside: tuple[LinkTorque, ...] = ()
+    beside: tuple[ModelledEffect, ...] = ()
 
     @property
     def robot(self) -> Robot:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scara_ident.arrays import Array
 from scara_ident.calling import asked_for
 from scara_ident.effects import EFFECTS, Effect, EffectTerm, Interval, Member, Scene
-from scara_ident.effects.signals import LinkTorque
+from scara_ident.effects.signals import ModelledEffect
 from scara_ident.errors import ScaraIdentError
 from scara_ident.estimation import Estimate
 from scara_ident.estimation.consistent.estimator import ConsistentEstimate
@@ -265,7 +265,8 @@ def _with_effects(base: TorqueModel, known: Mapping[str, Any], path: Path) -> To
         armatures={int(joint): value for joint, value in entry["armatures"].items()},
         # Results of earlier versions have none.
         link_torques=tuple(
-            LinkTorque(_family(item, path), _member(item), tuple(item["value"])) for item in entry.get("on_links", ())
+            ModelledEffect(_family(item, path), _member(item), tuple(item["value"]))
+            for item in entry.get("on_links", ())
         ),
         together=tuple((_family(item, path), _member(item)) for item in entry.get("together", ())),
     )

@@ -7,7 +7,7 @@ from dataclasses import replace
 from scara_ident.effects import Member, Scene
 from scara_ident.effects.links import point_mass, tool_of
 from scara_ident.effects.payload import PayloadChange
-from scara_ident.effects.signals import LinkTorque
+from scara_ident.effects.signals import ModelledEffect
 from scara_ident.robot.robot import Robot
 from tests.effects.scenes import scene_of
 
@@ -17,7 +17,7 @@ ALWAYS = Member(None, (-1.0,))
 
 def carrying(scene: Scene, mass: float) -> Scene:
     """The scene of a model that has the mass as an effect."""
-    return replace(scene, link_torques=(LinkTorque(PayloadChange(), ALWAYS, (mass,)),))
+    return replace(scene, link_torques=(ModelledEffect(PayloadChange(), ALWAYS, (mass,)),))
 
 
 def heavier(robot: Robot, mass: float) -> Scene:

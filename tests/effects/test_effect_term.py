@@ -12,7 +12,7 @@ from scara_ident.effects.gear import TransmissionLoss
 from scara_ident.effects.measurement import TimeDelay
 from scara_ident.effects.payload import PayloadOfRecordings
 from scara_ident.effects.position import Spring
-from scara_ident.effects.signals import LinkTorque
+from scara_ident.effects.signals import ModelledEffect
 from scara_ident.errors import ScaraIdentError
 from scara_ident.robot.robot import load_robot
 from tests.effects.scenes import moving, scene_of
@@ -55,10 +55,10 @@ def test_the_torque_in_a_state_is_that_of_its_columns_and_none_where_it_takes_mo
 
 def test_a_loss_in_a_state_is_that_of_what_a_state_tells_and_not_of_what_is_carried_at_times():
     scene, item = scene_of(load_robot()), moving(load_robot(), 0.02)
-    spring = LinkTorque(Spring(), Member(1), (0.05,))
+    spring = ModelledEffect(Spring(), Member(1), (0.05,))
     payload = PayloadOfRecordings()
     group = payload.in_recordings(scene, Member(None), frozenset(["m"]))
-    body = LinkTorque(payload, group, tuple(np.full(len(payload.columns(scene, group)), 0.1).tolist()))
+    body = ModelledEffect(payload, group, tuple(np.full(len(payload.columns(scene, group)), 0.1).tolist()))
     loss = EffectTerm(TransmissionLoss(), Member(1, (0.1,)), replace(scene, link_torques=(spring, body)))
     assert loss.in_state.scene.link_torques == (spring,)
     assert loss.in_state.in_state is loss.in_state

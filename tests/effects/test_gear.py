@@ -15,7 +15,7 @@ from scara_ident.effects import Member, Scene, Signals
 from scara_ident.effects.gear import TransmissionLoss, second_order, swinging_load
 from scara_ident.effects.payload import PayloadChange
 from scara_ident.effects.position import Spring
-from scara_ident.effects.signals import LinkTorque
+from scara_ident.effects.signals import ModelledEffect
 from scara_ident.motion.low_pass import differentiate, low_pass
 from scara_ident.motion.motion import Motion
 from scara_ident.robot.robot import load_robot
@@ -57,7 +57,7 @@ def test_beside_what_acts_on_links_it_is_what_the_simulated_gear_loses_of_all_to
     acting.append(fx.Spring(joint, stiffness, 0.0) if stiffness else None)
     result = simulate(arm, swing(arm.robot, 2.0), effects=[item for item in acting if item is not None])
     scene, item = true_scene(result), true_motion(result)
-    found = (LinkTorque(PayloadChange(), ALWAYS, (mass,)), LinkTorque(Spring(), Member(0), (stiffness,)))
+    found = (ModelledEffect(PayloadChange(), ALWAYS, (mass,)), ModelledEffect(Spring(), Member(0), (stiffness,)))
     scene = replace(scene, armatures=dict(enumerate(arm.armature.tolist())), link_torques=found)
     added = columns(PayloadChange(), scene, item, ALWAYS)[:, 0] * mass
     added = added + columns(Spring(), scene, item, Member(0))[:, 0] * stiffness

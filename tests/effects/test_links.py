@@ -27,7 +27,7 @@ from scara_ident.effects.links import (
     tool_of,
     usual_link_inertia,
 )
-from scara_ident.effects.signals import LinkTorque
+from scara_ident.effects.signals import ModelledEffect
 from scara_ident.effects.tilt import NominalBaseTilt
 from scara_ident.motion.motion import Motion
 from scara_ident.robot.robot import Robot, load_robot
@@ -161,7 +161,7 @@ def test_a_torque_that_is_of_the_position_knows_no_speed(effect: Effect, tmp_pat
 def test_what_a_leaning_base_does_to_links_changes_with_their_positions_alone():
     robot = load_robot(example_urdf("ur5_robot.urdf"))
     scene, item, joint = scene_of(robot), moving(robot, 0.2), 2
-    tilt = LinkTorque(NominalBaseTilt(), Member(None, (1.0,)), (0.02, -0.03))
+    tilt = ModelledEffect(NominalBaseTilt(), Member(None, (1.0,)), (0.02, -0.03))
     leaning = replace(scene, link_torques=(tilt,))
     rigid, found = (link_slopes(Signals(each, item), joint) for each in (scene, leaning))
     ends = []

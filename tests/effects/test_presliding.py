@@ -20,7 +20,7 @@ from scara_ident.effects.presliding import (
     dahl_state,
     turning_points,
 )
-from scara_ident.effects.signals import LinkTorque
+from scara_ident.effects.signals import ModelledEffect
 from scara_ident.model.model import build_model
 from scara_ident.robot.robot import load_robot
 from scara_ident.simulation import effects as fx
@@ -100,7 +100,7 @@ def test_what_builds_up_is_all_dry_friction_of_the_joint_that_at_low_speed_too()
     assert "1.5 times the Coulomb friction" in str(Presliding().inadmissible(scene, member, both, sure))
 
     def beside(joint: int, amplitude: float):
-        return replace(scene, beside=(LinkTorque(Stribeck(), Member(joint, (0.1,)), (amplitude,)),))
+        return replace(scene, beside=(ModelledEffect(Stribeck(), Member(joint, (0.1,)), (amplitude,)),))
 
     assert Presliding().inadmissible(beside(1, 0.7 * a0), member, both, sure) is None
     # Another joint's has nothing to do with it, and less friction at low speed than at others adds none.

@@ -11,7 +11,7 @@ import pytest
 
 from scara_ident.effects import Member, available_effects
 from scara_ident.effects.payload import PayloadOfRecordings
-from scara_ident.effects.signals import LinkTorque
+from scara_ident.effects.signals import ModelledEffect
 from scara_ident.errors import ScaraIdentError
 from scara_ident.estimation import Estimate
 from scara_ident.export.identified_model import IdentifiedModel, identified_model
@@ -123,7 +123,7 @@ def test_what_acts_on_links_reads_back_with_the_load_of_a_gear(found, content, r
     model = with_effects(base, found.estimate.value, ("spring", "transmission_loss"))
     payload, group = PayloadOfRecordings(frozenset(["empty"])), Member(None, partner=1)
     count = len(payload.columns(model.terms[-1].scene, group))
-    body = LinkTorque(payload, group, tuple(np.linspace(0.5, 1.5, count).tolist()))
+    body = ModelledEffect(payload, group, tuple(np.linspace(0.5, 1.5, count).tolist()))
     terms = [replace(term, scene=replace(term.scene, link_torques=(body,))) for term in model.terms[len(base.terms) :]]
     model = replace(model, terms=(*base.terms, *terms))
     k = len(model.columns)

@@ -12,7 +12,7 @@ from scara_ident.effects import EffectTerm, Member, available_effects
 from scara_ident.effects.effect import Effect
 from scara_ident.effects.payload import PayloadOfRecordings
 from scara_ident.effects.position import Spring
-from scara_ident.effects.signals import LinkTorque
+from scara_ident.effects.signals import ModelledEffect
 from scara_ident.export.traced_model import TracedArray, trace_model, traced
 from scara_ident.model.model import TorqueModel
 from scara_ident.model.regressor.tracing import Scalar, Trace, compile_program
@@ -54,8 +54,8 @@ def test_a_loss_is_recorded_as_that_of_an_arm_that_carries_nothing_and_has_its_s
     found = identified(robot, ("transmission_loss", "spring"), samples=60)
     payload, group = PayloadOfRecordings(frozenset(["empty"])), Member(None, partner=1)
     scene, motion = found.model.terms[-1].scene, states(robot, 5, 20)
-    body = LinkTorque(payload, group, (2.0,) * len(payload.columns(scene, group)))
-    spring = LinkTorque(Spring(), Member(5), (0.5,))
+    body = ModelledEffect(payload, group, (2.0,) * len(payload.columns(scene, group)))
+    spring = ModelledEffect(Spring(), Member(5), (0.5,))
     alone, both = (replace(found, model=with_link_torques(found.model, item)) for item in ((spring,), (spring, body)))
     expected = model_torque(alone, alone.value, motion)
     model = trace_model(both.model, both.value)
@@ -66,7 +66,7 @@ def test_a_loss_is_recorded_as_that_of_an_arm_that_carries_nothing_and_has_its_s
     assert all(np.max(np.abs(other - expected)) > 1e-6 * np.max(np.abs(expected)) for other in others)
 
 
-def with_link_torques(model: TorqueModel, torques: tuple[LinkTorque, ...]) -> TorqueModel:
+def with_link_torques(model: TorqueModel, torques: tuple[ModelledEffect, ...]) -> TorqueModel:
     """The model whose gears transmit them."""
     terms = (
         replace(term, scene=replace(term.scene, link_torques=torques)) if isinstance(term, EffectTerm) else term

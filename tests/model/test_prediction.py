@@ -18,7 +18,7 @@ from scara_ident.effects.payload import PayloadChange
 from scara_ident.effects.periodic import TorqueRipple
 from scara_ident.effects.position import Spring
 from scara_ident.effects.presliding import Presliding
-from scara_ident.effects.signals import LinkTorque
+from scara_ident.effects.signals import ModelledEffect
 from scara_ident.errors import UsageError
 from scara_ident.model.model import TorqueModel, build_model
 from scara_ident.model.prediction import Prediction, states
@@ -117,7 +117,7 @@ def test_a_torque_per_motor_turn_is_in_it_at_any_speed(speed: float):
 def test_a_loss_beside_a_body_carried_in_some_recordings_is_predicted_without_it():
     robot = load_robot()
     scene, payload, member = scene_of(robot), PayloadChange(), Member(None, (1.0,))
-    body = LinkTorque(payload, member, (2.0,))
+    body = ModelledEffect(payload, member, (2.0,))
     loaded = replace(scene, link_torques=(body,))
     terms = [EffectTerm(TransmissionLoss(), Member(1, (0.1,)), loaded), EffectTerm(payload, member, loaded)]
     wide = TorqueModel("wide", robot, (*scene.model.terms, *terms))

@@ -10,7 +10,7 @@ import pytest
 from scara_ident.effects import EffectTerm, Member, Scene, Signals
 from scara_ident.effects.gear import TransmissionLoss
 from scara_ident.effects.position import Spring
-from scara_ident.effects.signals import LinkTorque
+from scara_ident.effects.signals import ModelledEffect
 from scara_ident.export.identified_model import IdentifiedModel
 from scara_ident.model.model import TorqueModel
 from scara_ident.use.external_torque import ExternalTorque, ObserverSettings, observe_recording
@@ -25,7 +25,7 @@ def lossy(known: IdentifiedModel, order: int, spring: float = 0.0) -> tuple[Effe
     scene = Scene(known.model, known.value, 10.0, 100.0, 10.0, np.ones(2), np.ones(2), {})
     own = EffectTerm(Spring(), Member(1), scene)
     if spring:
-        scene = replace(scene, link_torques=(LinkTorque(Spring(), Member(1), (spring,)),))
+        scene = replace(scene, link_torques=(ModelledEffect(Spring(), Member(1), (spring,)),))
     term = EffectTerm(TransmissionLoss(order), Member(1, (SHARE,)), scene)
     terms = (*known.model.terms, term, *([own] if spring else []))
     value = np.concatenate([known.value, [SHARE], [spring] if spring else []])

@@ -14,7 +14,7 @@ from scara_ident.arrays import Array
 from scara_ident.diagnosis.candidates.finite_columns import finite_or_zero, is_finite
 from scara_ident.effects import Effect, EffectTerm, Member, Scene, Signals
 from scara_ident.effects.links import forget_shared
-from scara_ident.effects.signals import LinkTorque
+from scara_ident.effects.signals import ModelledEffect
 from scara_ident.estimation.joint_rows import JointRows
 from scara_ident.estimation.observations import Observations, observe
 from scara_ident.motion.motion import Motion
@@ -364,7 +364,7 @@ def columns_at_hand(observations: Observations) -> dict[Motion, tuple[Array, ...
     return {part.motion: raw for part, raw in zip(observations.data.stretches, raws, strict=True)}
 
 
-def _estimate(scene: Scene, on_links: tuple[LinkTorque, ...], together: Together) -> Hashable:
+def _estimate(scene: Scene, on_links: tuple[ModelledEffect, ...], together: Together) -> Hashable:
     return scene.value.tobytes(), tuple(sorted(scene.armatures.items())), on_links, together
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.candidates.candidates import Candidate
 from scara_ident.effects import Scene
-from scara_ident.effects.signals import LinkTorque
+from scara_ident.effects.signals import ModelledEffect
 
 
 def at_estimate(scene: Scene, chosen: Sequence[Candidate], value: Array) -> Scene:
@@ -21,7 +21,7 @@ def at_estimate(scene: Scene, chosen: Sequence[Candidate], value: Array) -> Scen
         stop = start + len(item.effect.columns(scene, item.member))
         # What follows from a load is no part of it.
         if item.effect.on_links and item.effect.geared_joint(item.member) is None:
-            found.append(LinkTorque(item.effect, item.member, tuple(value[start:stop].tolist())))
+            found.append(ModelledEffect(item.effect, item.member, tuple(value[start:stop].tolist())))
         start = stop
     return replace(scene, value=base, link_torques=tuple(found))
 

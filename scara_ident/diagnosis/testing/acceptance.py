@@ -12,7 +12,7 @@ from scara_ident.diagnosis.criteria import SelectionCriteria
 from scara_ident.diagnosis.testing.candidate_tests import Examination
 from scara_ident.effects import Scene
 from scara_ident.effects.effect import DOUBT_STDS
-from scara_ident.effects.signals import LinkTorque
+from scara_ident.effects.signals import ModelledEffect
 
 
 @dataclass(frozen=True)
@@ -115,7 +115,7 @@ def _inadmissible(
     start, beside = len(scene.value), []
     for item in chosen:
         stop = start + len(item.effect.columns(scene, item.member))
-        beside.append(LinkTorque(item.effect, item.member, tuple(examination.model_value[start:stop].tolist())))
+        beside.append(ModelledEffect(item.effect, item.member, tuple(examination.model_value[start:stop].tolist())))
         start = stop
     after = replace(scene, value=examination.model_value[: len(scene.value)], beside=tuple(beside))
     return candidate.effect.inadmissible(after, candidate.member, examination.value, std)

@@ -18,7 +18,7 @@ from scara_ident.effects.elasticity import JointElasticity
 from scara_ident.effects.friction import FrictionCoupling, Stribeck
 from scara_ident.effects.gear import TransmissionLoss
 from scara_ident.effects.position import Spring
-from scara_ident.effects.signals import LinkTorque
+from scara_ident.effects.signals import ModelledEffect
 from scara_ident.effects.tilt import BaseTilt
 from scara_ident.estimation import wls
 from scara_ident.estimation.observations import Observations, observe
@@ -183,7 +183,7 @@ def test_columns_are_made_once_and_again_only_where_they_follow_the_estimate(mon
 def test_columns_of_a_load_are_made_again_where_what_acts_on_links_is_another(monkeypatch: pytest.MonkeyPatch):
     seen = observed(exact_runs()[:1])
     scene = scene_on(seen.model, wls(seen).value, seen)
-    held = replace(scene, link_torques=(LinkTorque(Spring(), Member(1), (0.5,)),))
+    held = replace(scene, link_torques=(ModelledEffect(Spring(), Member(1), (0.5,)),))
     made = []
     for effect in (BaseTilt, TransmissionLoss):
         whole = effect.by_joint

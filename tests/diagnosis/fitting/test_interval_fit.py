@@ -14,7 +14,7 @@ from scara_ident.diagnosis.testing.selection_step import SelectionStep
 from scara_ident.effects import Interval, Member
 from scara_ident.effects.payload import PayloadChange
 from scara_ident.effects.payload_intervals import PayloadInIntervals
-from scara_ident.effects.signals import LinkTorque
+from scara_ident.effects.signals import ModelledEffect
 from scara_ident.robot.robot import Robot
 from tests.effects.intervals import CYCLES, arms, run, runs, seen
 
@@ -31,7 +31,7 @@ def test_intervals_that_are_off_are_moved(robots: tuple[Robot, Robot]):
     chosen = (Candidate(PayloadInIntervals(), Member(None, intervals=off)),)
     step = SelectionStep(scene, CandidateColumns(observations), chosen, np.full(2, 20.0), 1, CRITERIA)
     # Two rounds from far away: to a row, which is as long.
-    held = replace(scene, link_torques=(LinkTorque(chosen[0].effect, chosen[0].member, (1.0,)),))
+    held = replace(scene, link_torques=(ModelledEffect(chosen[0].effect, chosen[0].member, (1.0,)),))
     moved = refined(replace(step, scene=held))
     (found,) = moved.chosen
     # What acts on links acts then.
@@ -62,7 +62,7 @@ def test_what_acts_to_the_end_of_a_recording_does_not_end_before(robots: tuple[R
     length = float(np.ptp(made[2].time))
     chosen = (Candidate(PayloadInIntervals(), Member(None, intervals=(Interval(2, 3.0, length),))),)
     step = SelectionStep(scene, CandidateColumns(observations), chosen, np.full(2, 20.0), 1, CRITERIA)
-    held = replace(scene, link_torques=(LinkTorque(chosen[0].effect, chosen[0].member, (1.0,)),))
+    held = replace(scene, link_torques=(ModelledEffect(chosen[0].effect, chosen[0].member, (1.0,)),))
     ((item,),) = (own.member.intervals for own in refined(replace(step, scene=held)).chosen)
     assert item.start == pytest.approx(3.0, abs=0.05)
     assert (item.stop, item.stop_std) == (pytest.approx(length), 0.0)

@@ -25,7 +25,7 @@ from scara_ident.effects.gear import TransmissionLoss
 from scara_ident.effects.measurement import TimeDelay, shifted
 from scara_ident.effects.position import Spring
 from scara_ident.effects.presliding import Presliding
-from scara_ident.effects.signals import LinkTorque
+from scara_ident.effects.signals import ModelledEffect
 from scara_ident.effects.tilt import BaseTilt
 from scara_ident.estimation import wls
 from scara_ident.estimation.information import weighted
@@ -173,7 +173,7 @@ def test_observations_with_effects_are_those_of_the_model_that_has_them(runs: in
 
 def test_candidates_at_hand_are_at_the_first_scene_but_for_loads_that_are_others_now():
     step = step_beside(exact_runs(), [Candidate(Spring(), Member(1))])
-    held = LinkTorque(Spring(), Member(1), (0.5,))
+    held = ModelledEffect(Spring(), Member(1), (0.5,))
     later = replace(step, scene=replace(step.scene, value=1.1 * step.scene.value, link_torques=(held,)))
     candidates = [Candidate(TransmissionLoss(), Member(j, (0.1,))) for j in (0, 1)] + [
         Candidate(BaseTilt(), Member(None))
