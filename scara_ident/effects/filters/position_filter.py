@@ -63,20 +63,23 @@ class PositionFilter(FilterRest):
         return shared(signals.motion, key, lambda: list(self._made_changes(signals)))
 
     def _made_changes(self, signals: Signals) -> Iterator[list[Array]]:
-        motion, scene = signals.motion, signals.scene
-        parts = (motion.q, motion.v, motion.a)
-        coulomb = [friction_places(scene, joint).get(0, -1) for joint in range(scene.robot.n)]
-        for changes in zip(*(self.rest(part, motion.rate, _cut(signals)) for part in parts), strict=True):
-            q, v, a = (part + change for part, change in zip(parts, changes, strict=True))
-            moved = replace(motion, q=q, v=v, a=a, torque=None)
-            turned = scene.robot.drive_sign[:, None] * (_mean_sign(moved) - _mean_sign(motion))
-            there = scene.model.joint_columns(moved)
-            yield [
-                np.where((own == place)[:, None], turn, new - old)
-                for own, place, turn, new, old in zip(
-                    scene.model.active, coulomb, turned, there, signals.columns, strict=True
-                )
-            ]
+        motion = signals.motion
+        changes = (self.rest(part, motion.rate, _cut(signals)) for part in (motion.q, motion.v, motion.a))
+        for q, v, a in zip(*changes, strict=True):
+            yield changed_columns(signals, q, v, a)
+
+
+def changed_columns(signals: Signals, q: Array, v: Array, a: Array) -> list[Array]:
+    """Return what changes of positions and their derivatives, shape (n, N) each, change of the base model's columns, as `Signals.columns`."""
+    motion, scene = signals.motion, signals.scene
+    coulomb = [friction_places(scene, joint).get(0, -1) for joint in range(scene.robot.n)]
+    moved = replace(motion, q=motion.q + q, v=motion.v + v, a=motion.a + a, torque=None)
+    turned = scene.robot.drive_sign[:, None] * (_mean_sign(moved) - _mean_sign(motion))
+    there = scene.model.joint_columns(moved)
+    return [
+        np.where((own == place)[:, None], turn, new - old)
+        for own, place, turn, new, old in zip(scene.model.active, coulomb, turned, there, signals.columns, strict=True)
+    ]
 
 
 def _mean_sign(motion: Motion) -> Array:

@@ -1,0 +1,76 @@
+"""Positions behind filters without a delay, by those of SciPy; and that a gear is not believed in their place."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import butter, filtfilt
+
+from scara_ident.arrays import Array
+from scara_ident.diagnosis.diagnose import diagnose
+from scara_ident.effects import Member
+from scara_ident.effects.catalogue import available_effects
+from scara_ident.effects.elasticity import JointElasticity
+from scara_ident.effects.filters.smoothed_positions import SmoothedPositions
+from scara_ident.motion.motion import Motion
+from scara_ident.recording.recording import Recording
+from scara_ident.robot.robot import load_robot
+from scara_ident.simulation import simulate, virtual_arm
+from tests.effects.filters.runs import RATE
+from tests.effects.scenes import columns, motion, scene_of, wandering
+
+BAND, ALL = 8.0, Member(None)
+
+
+def smoothed(item: Recording, order: int, cut: float) -> Recording:
+    """The recording with positions that went through a Butterworth filter there and back."""
+    up, down = butter(order, cut, fs=item.rate)
+    return replace(item, position=filtfilt(up, down, item.position, axis=1))
+
+
+def harmonics(passed: Callable[[Array], Array]) -> Motion:
+    """A motion of three frequencies, of which each passes by so much."""
+    time = np.arange(8000) / RATE
+    size = np.array([[0.5, 0.05, 0.01], [0.4, 0.06, 0.008]])[..., None]
+    frequency = np.array([0.4, 1.7, 4.0])[:, None]
+    omega, own = 2.0 * np.pi * frequency, size * passed(frequency)
+    angle = omega * time + np.array([[0.3, 1.0, 2.0], [1.5, 0.2, 0.7]])[..., None]
+    q, v, a = own * np.sin(angle), own * omega * np.cos(angle), -own * omega**2 * np.sin(angle)
+    return motion(q.sum(axis=1), v.sum(axis=1), a.sum(axis=1), rate=RATE)
+
+
+@pytest.mark.parametrize(("power", "place"), [(2, 0), (4, 1)])
+def test_a_share_of_a_power_of_the_frequency_is_what_such_a_filter_took(power: int, place: int):
+    scene, cut = scene_of(load_robot(), rate=RATE, band=BAND), 40.0 if power == 2 else 15.0
+    # Without the steps of dry friction, which turns elsewhere.
+    scene = replace(scene, value=np.where(np.char.startswith(scene.model.names, "a"), 0.0, scene.value))
+    before, after = harmonics(np.ones_like), harmonics(lambda frequency: 1.0 / (1.0 + (frequency / cut) ** power))
+    missing = [np.einsum("jpn,p->jn", scene.model.regressor(item), scene.value) for item in (before, after)]
+    inside = slice(1000, -1000)
+    told = (BAND / cut) ** power * columns(SmoothedPositions(), scene, after, ALL)[:, place, inside]
+    missed = (missing[0] - missing[1])[:, inside]
+    assert np.sqrt(np.mean((told - missed) ** 2)) < 0.02 * np.sqrt(np.mean(missed**2))
+
+
+def test_it_is_asked_for_beside_a_gear_and_in_no_catalogue():
+    assert JointElasticity.imitated_by == (SmoothedPositions(),)
+    assert SmoothedPositions().members(scene_of(load_robot())) == (ALL,)
+    assert SmoothedPositions() not in available_effects()
+
+
+@pytest.mark.slow
+def test_no_gear_is_believed_where_positions_were_smoothed():
+    arm = virtual_arm()
+    runs = [
+        smoothed(simulate(arm, wandering(arm, f"t{k}", 10 + k, 10.0), seed=k, rate=250.0).recording, 2, 7.0)
+        for k in range(4)
+    ]
+    found = diagnose(load_robot(), runs[:-1], validation=runs[-1:])
+    assert (found.effects, found.verdict) == ((), "undecided")
+    why = next(item for item in found.tentative if item.effect == "joint_elasticity").why
+    assert why.startswith(
+        "a filter of the positions without a delay explains as much in its place, and with it in the model"
+    )
