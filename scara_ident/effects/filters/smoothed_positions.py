@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
-from scara_ident.effects.effect import Effect
+from scara_ident.effects.effect import DOUBT_STDS, Effect
 from scara_ident.effects.filters.position_filter import changed_columns
 from scara_ident.effects.parameters import Coefficient, Member
 from scara_ident.effects.signals import Scene, Signals
@@ -44,6 +44,12 @@ class SmoothedPositions(Effect):
     def members(self, scene: Scene) -> tuple[Member, ...]:
         """Return that of all joints."""
         return (Member(None),)
+
+    def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
+        """Return the reason if more than all of the motion would be left within the band, at 0.7 of its highest frequency."""
+        weight = np.array([0.5 ** (power / 2 - 1) for power in POWERS])
+        taken, spread = float(weight @ value), float(np.linalg.norm(weight * std))
+        return "such a filter would amplify the motion" if taken < -DOUBT_STDS * spread else None
 
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
         """Return what the torque of bodies and friction changes by with each power."""

@@ -55,6 +55,13 @@ def test_a_share_of_a_power_of_the_frequency_is_what_such_a_filter_took(power: i
     assert np.sqrt(np.mean((told - missed) ** 2)) < 0.02 * np.sqrt(np.mean(missed**2))
 
 
+@pytest.mark.parametrize(("shares", "amplified"), [((-1.35, 0.10), True), ((-0.9, 1.9), False), ((-0.1, 0.1), False)])
+def test_one_that_would_amplify_the_motion_is_none(shares: tuple[float, float], amplified: bool):
+    """Such a one took the place of a gear of 107,000 N m/rad in a band of 50 Hz."""
+    found = SmoothedPositions().inadmissible(scene_of(load_robot()), ALL, np.array(shares), np.array([0.05, 0.05]))
+    assert (found is not None) is amplified
+
+
 def test_it_is_asked_for_beside_a_gear_and_in_no_catalogue():
     assert JointElasticity.imitated_by == (SmoothedPositions(),)
     assert SmoothedPositions().members(scene_of(load_robot())) == (ALL,)
