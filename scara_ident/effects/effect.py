@@ -292,7 +292,7 @@ class Effect(ABC):
         return None
 
     def in_place_of(self, scene: Scene, effect: Effect, member: Member, value: Array) -> Member | None:
-        """Return what to try in the place of a member of another family with impossible coefficients; None without one."""
+        """Return what to try in the place of a member of another family with impossible coefficients, or that it imitates; None without one."""
         return None
 
     def other_laws(self) -> tuple[Effect, ...]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.effects.effect import DOUBT_STDS, Effect
-from scara_ident.effects.filters.smoothed_positions import SmoothedPositions
+from scara_ident.effects.filters.smoothed_positions import NulledPositions, SmoothedPositions
 from scara_ident.effects.flight import FreeLink
 from scara_ident.effects.following import EstimateSlopes
 from scara_ident.effects.links import usual_link_inertia, usual_link_inertia_slopes
@@ -97,7 +97,7 @@ class JointElasticity(BehindGear):
     fitted_first = True
     together = True
     smooth = True
-    imitated_by = (SmoothedPositions(),)
+    imitated_by = (SmoothedPositions(), NulledPositions())
     view = View("acceleration")
     experiment = "excite above 5 Hz with short steps, and look for a resonance that stays at its frequency"
 

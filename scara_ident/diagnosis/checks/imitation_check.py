@@ -52,13 +52,15 @@ def imitators(step: SelectionStep, candidates: Sequence[Candidate]) -> list[Cand
 def _imitating(step: SelectionStep, decision: Decision) -> Iterator[tuple[Candidate, float]]:
     """Give what does as well as an effect, with the share of what this removes that is left beside it, less than is asked."""
     effect, criteria = decision.candidate.effect, step.criteria
-    others = [Candidate(other, member) for other in effect.imitated_by for member in other.members(step.scene)]
+    own, value = decision.candidate.member, decision.examination.value
+    places = ((other, other.in_place_of(step.scene, effect, own, value)) for other in effect.imitated_by)
+    others = [Candidate(other, member) for other, member in places if member is not None]
     for other, instead in zip(others, step.judge(others) if others else [], strict=True):
         if not instead.accepted or instead.examination.held_out < decision.examination.held_out:
             continue
         alone = tune(replace(step, chosen=(*step.chosen, other)))
         both = tune(replace(alone, chosen=(*alone.chosen, decision.candidate)))
-        own = np.sum(step.model.squares) - np.sum(decision.examination.left)
-        share = float(np.sum(alone.model.squares) - np.sum(both.model.squares)) / float(own)
+        gained = np.sum(step.model.squares) - np.sum(decision.examination.left)
+        share = float(np.sum(alone.model.squares) - np.sum(both.model.squares)) / float(gained)
         if share < criteria.min_beside_rest:
             yield other, share

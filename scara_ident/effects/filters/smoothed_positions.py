@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from abc import abstractmethod
+from collections.abc import Callable, Iterable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 from scara_ident.arrays import Array
 from scara_ident.effects.effect import DOUBT_STDS, Effect
 from scara_ident.effects.filters.position_filter import changed_columns
-from scara_ident.effects.parameters import Coefficient, Member
+from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter
 from scara_ident.effects.signals import Scene, Signals
 from scara_ident.motion.low_pass import HIGHEST_CUT
 from scara_ident.motion.transfer import through
@@ -21,29 +22,46 @@ POWERS = (2, 4)
 # Periods of the band over which the derivatives of a signal that ends there are spread.
 MEMORY_PERIODS = 4.0
 
+Gain = Callable[[Array], Array]
 
-class SmoothedPositions(Effect):
-    """Positions of all joints after a low-pass without a delay, as one that runs forwards and backwards over a recording.
 
-    It is no part of an arm and in no catalogue. What it takes from the motion at high frequencies, the torque has: near the
-    frequency where little is left, a link that swings behind an elastic gear has as much more torque than motion. The
-    positions before such a filter are ``q + c2 (f / band)^2 q + c4 (f / band)^4 q`` and so on; a column is the change of the torque by
-    one of these, ``Y(q + d, v + d', a + d'') theta - Y(q, v, a) theta``.
+class Smoothing(Effect):
+    """Positions of all joints after a low-pass without a delay, as one that runs forwards and backwards: the base class of two laws.
+
+    It is no part of an arm and in no catalogue. What such a filter takes from the motion at high frequencies, the torque has; near the
+    frequency where little is left, so has a link that swings behind an elastic gear. With the positions q + d before the
+    filter, a column is ``Y(q + d, v + d', a + d'') theta - Y(q, v, a) theta``.
     """
 
-    name = "smoothed_positions"
     summary = "a filter of the positions without a delay"
-    coefficients = tuple(
-        Coefficient(f"share_{power}", "1", f"share by the frequency to the power of {power}") for power in POWERS
-    )
     all_joints = True
     follows_estimate = True
     smooth = True
     not_simulated = "it is not a property of the arm"
 
-    def members(self, scene: Scene) -> tuple[Member, ...]:
+    @abstractmethod
+    def gains(self, scene: Scene, member: Member) -> Iterable[Gain]:
+        """Give for each coefficient d over q, by the frequency in Hz."""
+
+    def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
+        """Return what the torque of bodies and friction changes by with each d."""
+        value, active, motion = signals.scene.value, signals.scene.model.active, signals.motion
+        for gain in self.gains(signals.scene, member):
+            rows = changed_columns(signals, *(_times(signals, part, gain) for part in (motion.q, motion.v, motion.a)))
+            yield np.array([value[own] @ each for own, each in zip(active, rows, strict=True)])
+
+
+class SmoothedPositions(Smoothing):
+    """Smoothing that leaves some motion at all frequencies: ``d = (c2 (f / band)^2 + c4 (f / band)^4) q``."""
+
+    name = "smoothed_positions"
+    coefficients = tuple(
+        Coefficient(f"share_{power}", "1", f"share by the frequency to the power of {power}") for power in POWERS
+    )
+
+    def in_place_of(self, scene: Scene, effect: Effect, member: Member, value: Array) -> Member:
         """Return that of all joints."""
-        return (Member(None),)
+        return Member(None)
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """Return the reason if more than all of the motion would be left within the band, at 0.7 of its highest frequency."""
@@ -51,24 +69,57 @@ class SmoothedPositions(Effect):
         taken, spread = float(weight @ value), float(np.linalg.norm(weight * std))
         return "such a filter would amplify the motion" if taken < -DOUBT_STDS * spread else None
 
-    def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
-        """Return what the torque of bodies and friction changes by with each power."""
-        value, active = signals.scene.value, signals.scene.model.active
-        motion = signals.motion
-        for power in POWERS:
-            rows = changed_columns(
-                signals, *(_missing(signals, part, power) for part in (motion.q, motion.v, motion.a))
-            )
-            yield np.array([value[own] @ each for own, each in zip(active, rows, strict=True)])
+    def gains(self, scene: Scene, member: Member) -> Iterable[Gain]:
+        """Give the powers."""
+        return tuple(_power(power, scene.band) for power in POWERS)
 
 
-def _missing(signals: Signals, signal: Array, power: int) -> Array:
-    """Return a signal (n, N) times a power of the frequency over that of the band, below that of the signal's derivatives."""
+class NulledPositions(Smoothing):
+    """Smoothing that leaves nothing at one frequency f0, as a polynomial over a window does.
+
+    With ``u = f / f0`` it is ``d = c u^2 / (1 - u^2) q``, and near f0 the real part of what a swing with a damping ratio has, so
+    that it is finite.
+    """
+
+    name = "nulled_positions"
+    coefficients = (
+        Coefficient("share", "1", "share of the motion that is missing", "such a filter would amplify the motion"),
+    )
+    nonlinear = (
+        NonlinearParameter("frequency", "Hz", 2.0, 200.0),
+        NonlinearParameter("_damping_ratio", "1", 0.01, 0.7),
+    )
+
+    def in_place_of(self, scene: Scene, effect: Effect, member: Member, value: Array) -> Member | None:
+        """Return one of what swings, with nothing left at its frequency."""
+        return Member(None, member.nonlinear) if len(member.nonlinear) == len(self.nonlinear) else None
+
+    def limits(self, scene: Scene, member: Member) -> tuple[tuple[float, float], ...]:
+        """Return the smallest and largest frequency and damping ratio."""
+        return tuple((item.lower, item.upper) for item in self.nonlinear)
+
+    def gains(self, scene: Scene, member: Member) -> Iterable[Gain]:
+        """Give the swing's."""
+        null, ratio = member.nonlinear
+
+        def gain(frequency: Array) -> Array:
+            square = (frequency / null) ** 2
+            return square * (1.0 - square) / ((1.0 - square) ** 2 + 4.0 * ratio**2 * square)
+
+        return (gain,)
+
+
+def _power(power: int, band: float) -> Gain:
+    return lambda frequency: np.asarray((frequency / band) ** power)
+
+
+def _times(signals: Signals, signal: Array, gain: Gain) -> Array:
+    """Return a signal (n, N) times a gain, below the frequencies of the signal's derivatives."""
     rate, band = signals.motion.rate, signals.scene.band
     cut = signals.derivative_cut or HIGHEST_CUT * rate
 
     def response(omega: Array) -> NDArray[np.complexfloating]:
         frequency = omega * rate / (2.0 * np.pi)
-        return np.asarray((frequency / band) ** power / (1.0 + (frequency / cut) ** 8), dtype=complex)
+        return np.asarray(gain(frequency) / (1.0 + (frequency / cut) ** 8), dtype=complex)
 
     return through(signal, response, int(np.ceil(MEMORY_PERIODS * rate / band)) + 1)[0]

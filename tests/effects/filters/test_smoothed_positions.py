@@ -14,7 +14,7 @@ from scara_ident.diagnosis.diagnose import diagnose
 from scara_ident.effects import Member
 from scara_ident.effects.catalogue import available_effects
 from scara_ident.effects.elasticity import JointElasticity
-from scara_ident.effects.filters.smoothed_positions import SmoothedPositions
+from scara_ident.effects.filters.smoothed_positions import NulledPositions, SmoothedPositions
 from scara_ident.motion.motion import Motion
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import load_robot
@@ -63,9 +63,24 @@ def test_one_that_would_amplify_the_motion_is_none(shares: tuple[float, float], 
 
 
 def test_it_is_asked_for_beside_a_gear_and_in_no_catalogue():
-    assert JointElasticity.imitated_by == (SmoothedPositions(),)
-    assert SmoothedPositions().members(scene_of(load_robot())) == (ALL,)
-    assert SmoothedPositions() not in available_effects()
+    assert JointElasticity.imitated_by == (SmoothedPositions(), NulledPositions())
+    scene, own, value = scene_of(load_robot()), Member(1, (9.0, 0.05)), np.ones(1)
+    assert SmoothedPositions().in_place_of(scene, JointElasticity(), own, value) == ALL
+    assert NulledPositions().in_place_of(scene, JointElasticity(), own, value) == Member(None, (9.0, 0.05))
+    assert NulledPositions().in_place_of(scene, JointElasticity(), Member(1), value) is None
+    assert not {type(item) for item in available_effects()} & {SmoothedPositions, NulledPositions}
+
+
+def test_of_a_filter_with_a_zero_that_is_told_by_its_frequency():
+    scene = scene_of(load_robot(), rate=RATE, band=BAND)
+    scene = replace(scene, value=np.where(np.char.startswith(scene.model.names, "a"), 0.0, scene.value))
+    before, after = harmonics(np.ones_like), harmonics(lambda frequency: 1.0 - (frequency / 40.0) ** 2)
+    missing = [np.einsum("jpn,p->jn", scene.model.regressor(item), scene.value) for item in (before, after)]
+    inside, member = slice(1000, -1000), Member(None, (40.0, 0.01))
+    told = columns(NulledPositions(), scene, after, member)[:, 0, inside]
+    missed = (missing[0] - missing[1])[:, inside]
+    assert np.sqrt(np.mean((told - missed) ** 2)) < 0.02 * np.sqrt(np.mean(missed**2))
+    assert NulledPositions().limits(scene, member) == ((2.0, 200.0), (0.01, 0.7))
 
 
 @pytest.mark.slow
