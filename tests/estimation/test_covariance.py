@@ -325,3 +325,14 @@ def test_a_direction_that_is_hardly_determined_does_not_make_all_infinitely_unsu
     assert known.kind == found.kind == "pooled block"
     assert np.all(np.isfinite(found.matrix))
     np.testing.assert_allclose(found.freedom, known.freedom, rtol=1e-6)
+
+
+def test_what_no_block_shows_has_the_freedom_of_one_and_no_warning():
+    """Positions that were interpolated between few samples left a column of zeros beside what a prior said of it."""
+    products, root = np.zeros((6, 2, 2)), np.eye(2)
+    products[:, 0, 0] = 1.0 / 6.0
+    with np.errstate(all="raise"):
+        share, freedom = covariance._of_white(products, root, np.ones(5, dtype=bool))
+    assert freedom[1] == 1.0
+    assert freedom[0] > 3.0
+    assert share[1] == 1.0
