@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import logging
 
-from scara_ident.recording.audit import clock, effort, held, lost_samples, position, stamps
+from scara_ident.recording.audit import clock, effort, held, interpolated, lost_samples, position, stamps
 from scara_ident.recording.audit.samples import Finding, Samples, once
 
 _LOG = logging.getLogger(__name__)
@@ -40,6 +40,7 @@ CHECKS = (
     effort.coarse_effort,
     position.limits,
     position.computed,
+    interpolated.interpolated_positions,
     clock.enough,
 )
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scara_ident.arrays import Array
 from scara_ident.manners import several
 from scara_ident.recording.audit.effort import without_noise
+from scara_ident.recording.audit.interpolated import rows_between_corners
 from scara_ident.recording.audit.samples import (
     GAP_STEPS,
     IDLE_TRAVEL,
@@ -247,6 +248,9 @@ def computed(samples: Samples) -> Checked:
     """Say where positions beside efforts are no measurement: a simulator's, or what an arm was commanded to do."""
     moving = ~samples.idle()
     if samples.effort is None or not moving.any() or not all(map(is_computed, samples.position[moving])):
+        return samples, []
+    if all(map(rows_between_corners, samples.position[moving])):
+        # Between few samples nothing tells of their noise.
         return samples, []
     # Of a simulator that has no noise at all nobody takes them for measured.
     if any(without_noise(row, np.ones(samples.count, dtype=bool)) for row in samples.effort[moving]):
