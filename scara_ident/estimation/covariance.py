@@ -158,7 +158,7 @@ def _of_white(products: Array, root: Array, follows: NDArray[np.bool_]) -> tuple
     some = variance > 0.0
     share = 1.0 - np.divide(opposed, variance, out=np.zeros(len(root)), where=some)
     together = squares + 0.5 * neighbours
-    # What no block shows, as where another parameter takes all of its columns, has no more freedom than one block.
+    # What no block shows has no more freedom than one block.
     freedom = np.divide(variance**2, together, out=np.ones(len(root)), where=some & (together > 0.0))
     return share, freedom
 

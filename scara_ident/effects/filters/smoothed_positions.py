@@ -85,6 +85,7 @@ class NulledPositions(Smoothing):
     coefficients = (
         Coefficient("share", "1", "share of the motion that is missing", "such a filter would amplify the motion"),
     )
+    # As far as those of a link that swings.
     nonlinear = (
         NonlinearParameter("frequency", "Hz", 2.0, 200.0),
         NonlinearParameter("_damping_ratio", "1", 0.01, 0.7),
@@ -93,10 +94,6 @@ class NulledPositions(Smoothing):
     def in_place_of(self, scene: Scene, effect: Effect, member: Member, value: Array) -> Member | None:
         """Return one of what swings, with nothing left at its frequency."""
         return Member(None, member.nonlinear) if len(member.nonlinear) == len(self.nonlinear) else None
-
-    def limits(self, scene: Scene, member: Member) -> tuple[tuple[float, float], ...]:
-        """Return the smallest and largest frequency and damping ratio."""
-        return tuple((item.lower, item.upper) for item in self.nonlinear)
 
     def gains(self, scene: Scene, member: Member) -> Iterable[Gain]:
         """Give the swing's."""
