@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from scara_ident.arrays import Array
 from scara_ident.effects.effect import DOUBT_STDS, Effect
 from scara_ident.effects.filters.position_filter import changed_columns
+from scara_ident.effects.following import EstimateSlopes
+from scara_ident.effects.links import shared
 from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter
 from scara_ident.effects.signals import Scene, Signals
 from scara_ident.motion.low_pass import HIGHEST_CUT
@@ -45,10 +47,28 @@ class Smoothing(Effect):
 
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
         """Return what the torque of bodies and friction changes by with each d."""
-        value, active, motion = signals.scene.value, signals.scene.model.active, signals.motion
-        for gain in self.gains(signals.scene, member):
-            rows = changed_columns(signals, *(_times(signals, part, gain) for part in (motion.q, motion.v, motion.a)))
+        value, active = signals.scene.value, signals.scene.model.active
+        for rows in self.changes(signals, member):
             yield np.array([value[own] @ each for own, each in zip(active, rows, strict=True)])
+
+    def estimate_slopes(self, signals: Signals, member: Member, value: Array) -> EstimateSlopes:
+        """Return those of the base model's columns."""
+        return {
+            joint: (
+                signals.scene.model.active[joint],
+                sum(x * own for x, own in zip(value.tolist(), each, strict=True)),
+            )
+            for joint, each in enumerate(zip(*self.changes(signals, member), strict=True))
+        }
+
+    def changes(self, signals: Signals, member: Member) -> list[list[Array]]:
+        """Return for each d what it changes of the base model's columns, as `Signals.columns`; it follows from no estimate."""
+        motion = signals.motion
+        parts = (motion.q, motion.v, motion.a)
+        return [
+            changed_columns(signals, *(_times(signals, part, gain) for part in parts))
+            for gain in self.gains(signals.scene, member)
+        ]
 
 
 class SmoothedPositions(Smoothing):
@@ -72,6 +92,11 @@ class SmoothedPositions(Smoothing):
     def gains(self, scene: Scene, member: Member) -> Iterable[Gain]:
         """Give the powers."""
         return tuple(_power(power, scene.band) for power in POWERS)
+
+    def changes(self, signals: Signals, member: Member) -> list[list[Array]]:
+        """Return those of its only member, made once."""
+        key = (self.name, signals.scene.band, signals.scene.model)
+        return shared(signals.motion, key, lambda: super(SmoothedPositions, self).changes(signals, member))
 
 
 class NulledPositions(Smoothing):

@@ -11,10 +11,11 @@ from scipy.signal import butter, filtfilt
 
 from scara_ident.arrays import Array
 from scara_ident.diagnosis.diagnose import diagnose
-from scara_ident.effects import Member
+from scara_ident.effects import Effect, Member, Signals
 from scara_ident.effects.catalogue import available_effects
 from scara_ident.effects.elasticity import JointElasticity
 from scara_ident.effects.filters.smoothed_positions import NulledPositions, SmoothedPositions
+from scara_ident.effects.following import slopes_by_differences
 from scara_ident.motion.motion import Motion
 from scara_ident.recording.recording import Recording
 from scara_ident.robot.robot import load_robot
@@ -53,6 +54,22 @@ def test_a_share_of_a_power_of_the_frequency_is_what_such_a_filter_took(power: i
     told = (BAND / cut) ** power * columns(SmoothedPositions(), scene, after, ALL)[:, place, inside]
     missed = (missing[0] - missing[1])[:, inside]
     assert np.sqrt(np.mean((told - missed) ** 2)) < 0.02 * np.sqrt(np.mean(missed**2))
+
+
+@pytest.mark.parametrize(
+    ("effect", "member", "value"),
+    [(SmoothedPositions(), ALL, [0.3, 0.2]), (NulledPositions(), Member(None, (9.0, 0.05)), [0.4])],
+)
+def test_derivatives_by_the_estimate_are_those_of_the_torque(effect: Effect, member: Member, value: list[float]):
+    """By differences they took minutes on six joints: each of some forty parameters made all columns anew."""
+    scene = scene_of(load_robot(), rate=RATE, band=BAND)
+    signals = Signals(scene, harmonics(np.ones_like))
+    told = effect.estimate_slopes(signals, member, np.array(value))
+    expected = slopes_by_differences(effect, signals, member, np.array(value))
+    for joint in range(2):
+        own, other = np.zeros((2, len(scene.value), signals.motion.samples))
+        own[told[joint][0]], other[expected[joint][0]] = told[joint][1], expected[joint][1]
+        assert np.abs(own - other).max() < 1e-6 * np.abs(other).max()
 
 
 @pytest.mark.parametrize(("shares", "amplified"), [((-1.35, 0.10), True), ((-0.9, 1.9), False), ((-0.1, 0.1), False)])
