@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -49,13 +49,7 @@ class PositionFilter(FilterRest):
 
     def estimate_slopes(self, signals: Signals, member: Member, value: Array) -> EstimateSlopes:
         """Return those of the base model's columns: how links lag by other bodies is small beside it."""
-        return {
-            joint: (
-                signals.scene.model.active[joint],
-                sum(x * own for x, own in zip(value.tolist(), each, strict=True)),
-            )
-            for joint, each in enumerate(zip(*self._changed(signals), strict=True))
-        }
+        return slopes_of(signals, value, self._changed(signals))
 
     def _changed(self, signals: Signals) -> list[list[Array]]:
         """Return for each law the change of the base model's columns, as `Signals.columns`; it follows from no estimate."""
@@ -80,6 +74,14 @@ def changed_columns(signals: Signals, q: Array, v: Array, a: Array) -> list[Arra
         np.where((own == place)[:, None], turn, new - old)
         for own, place, turn, new, old in zip(scene.model.active, coulomb, turned, there, signals.columns, strict=True)
     ]
+
+
+def slopes_of(signals: Signals, value: Array, changes: Sequence[Sequence[Array]]) -> EstimateSlopes:
+    """Return `Effect.estimate_slopes` of coefficients (k,), each of which changes the base model's columns by its own of `changed_columns`."""
+    return {
+        joint: (own, sum(x * rows for x, rows in zip(value.tolist(), each, strict=True)))
+        for joint, (own, each) in enumerate(zip(signals.scene.model.active, zip(*changes, strict=True), strict=True))
+    }
 
 
 def _mean_sign(motion: Motion) -> Array:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.effects.effect import DOUBT_STDS, Effect
-from scara_ident.effects.filters.position_filter import changed_columns
+from scara_ident.effects.filters.position_filter import changed_columns, slopes_of
 from scara_ident.effects.following import EstimateSlopes
 from scara_ident.effects.links import shared
 from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter
@@ -53,13 +53,7 @@ class Smoothing(Effect):
 
     def estimate_slopes(self, signals: Signals, member: Member, value: Array) -> EstimateSlopes:
         """Return those of the base model's columns."""
-        return {
-            joint: (
-                signals.scene.model.active[joint],
-                sum(x * own for x, own in zip(value.tolist(), each, strict=True)),
-            )
-            for joint, each in enumerate(zip(*self.changes(signals, member), strict=True))
-        }
+        return slopes_of(signals, value, self.changes(signals, member))
 
     def changes(self, signals: Signals, member: Member) -> list[list[Array]]:
         """Return for each d what it changes of the base model's columns, as `Signals.columns`; it follows from no estimate."""
