@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from scara_ident.arrays import Array
 from scara_ident.effects.effect import Effect
+from scara_ident.effects.filters.smoothed_positions import SmoothedPositions
 from scara_ident.effects.friction import not_all_of_coulomb
 from scara_ident.effects.parameters import Coefficient, Member, NonlinearParameter, Parameter, View, deviation
 from scara_ident.effects.signals import Scene, Signals
@@ -49,6 +50,7 @@ class Presliding(Effect):
         NonlinearParameter("presliding_distance", "{position}", 1e-5, 0.3, of_length=True, symmetric_power=1.0),
     )
     in_small_ways = True
+    imitated_by = (SmoothedPositions(),)
     view = View("reversal", along=True, distance="presliding_distance")
     experiment = "reverse often with small amplitude at two speeds: presliding depends on the distance travelled, a delay on time"
 
