@@ -34,9 +34,9 @@ class ToolForce(Effect):
     smooth = True
     not_simulated = "it is not a property of the arm: use a push without end"
 
-    def in_place_of(self, scene: Scene, effect: Effect, member: Member, value: Array) -> Member:
+    def members(self, scene: Scene) -> tuple[Member, ...]:
         """Return that of all joints."""
-        return Member(None)
+        return (Member(None),)
 
     def signal_columns(self, signals: Signals, member: Member) -> Iterable[Array]:
         """Return what the drives give to hold one newton along each axis of the base."""

@@ -10,7 +10,7 @@ import numpy as np
 from scara_ident.diagnosis.candidates.candidates import Candidate
 from scara_ident.diagnosis.fitting.nonlinear_fit import tune
 from scara_ident.diagnosis.testing.acceptance import Decision
-from scara_ident.diagnosis.testing.selection_step import SelectionStep
+from scara_ident.diagnosis.testing.selection_step import SelectionStep, best_of_each
 
 
 def imitation_objection(step: SelectionStep, decision: Decision) -> str | None:
@@ -53,14 +53,19 @@ def _imitating(step: SelectionStep, decision: Decision) -> Iterator[tuple[Candid
     """Give what does as well as an effect, with the share of what this removes that is left beside it, less than is asked."""
     effect, criteria = decision.candidate.effect, step.criteria
     own, value = decision.candidate.member, decision.examination.value
-    places = ((other, other.in_place_of(step.scene, effect, own, value)) for other in effect.imitated_by)
-    others = [Candidate(other, member) for other, member in places if member is not None]
-    for other, instead in zip(others, step.judge(others) if others else [], strict=True):
+    others = [
+        Candidate(other, member)
+        for other in effect.imitated_by
+        for member in (*other.members(step.scene), other.in_place_of(step.scene, effect, own, value))
+        if member is not None
+    ]
+    for point in best_of_each(step.judge(others) if others else []).values():
+        alone = tune(replace(step, chosen=(*step.chosen, point.candidate)))
+        (instead,) = alone.without(len(step.chosen)).judge([alone.chosen[-1]])
         if not instead.accepted or instead.examination.held_out < decision.examination.held_out:
             continue
-        alone = tune(replace(step, chosen=(*step.chosen, other)))
         both = tune(replace(alone, chosen=(*alone.chosen, decision.candidate)))
         gained = np.sum(step.model.squares) - np.sum(decision.examination.left)
         share = float(np.sum(alone.model.squares) - np.sum(both.model.squares)) / float(gained)
         if share < criteria.min_beside_rest:
-            yield other, share
+            yield alone.chosen[-1], share

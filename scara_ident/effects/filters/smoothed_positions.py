@@ -21,6 +21,12 @@ from scara_ident.motion.transfer import through
 # Powers of the frequency, over that of the band, by which such a filter leaves less: of the second are Gauss's and a first order that
 # runs there and back, of the fourth a Butterworth filter of second order that does so. Others are between.
 POWERS = (2, 4)
+# Frequencies over that of the band where filters may leave nothing that are tried, and the damping ratio that stands for how narrow.
+NULLS, NULL_DAMPING = np.geomspace(0.5, 2.0, 7), 0.1
+# Largest damping ratio that is tried: what is as wide leaves motion at its frequency, as a gear does.
+WIDEST = 0.15
+# Share of it at which a fit counts as having ended there.
+AS_WIDE = 0.99
 # Periods of the band over which the derivatives of a signal that ends there are spread.
 MEMORY_PERIODS = 4.0
 
@@ -73,9 +79,9 @@ class SmoothedPositions(Smoothing):
         Coefficient(f"share_{power}", "1", f"share by the frequency to the power of {power}") for power in POWERS
     )
 
-    def in_place_of(self, scene: Scene, effect: Effect, member: Member, value: Array) -> Member:
+    def members(self, scene: Scene) -> tuple[Member, ...]:
         """Return that of all joints."""
-        return Member(None)
+        return (Member(None),)
 
     def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
         """Return the reason if more than all of the motion would be left within the band, at 0.7 of its highest frequency."""
@@ -96,33 +102,47 @@ class SmoothedPositions(Smoothing):
 class NulledPositions(Smoothing):
     """Smoothing that leaves nothing at one frequency f0, as a polynomial over a window does.
 
-    With ``u = f / f0`` it is ``d = c u^2 / (1 - u^2) q``, and near f0 the real part of what a swing with a damping ratio has, so
-    that it is finite.
+    With ``u = f / f0`` it is ``d = c u^2 / (1 - u^2) q`` and the powers of `SmoothedPositions`. The first is near f0 the real part of
+    what a swing with a damping ratio has, so that it is finite.
     """
 
     name = "nulled_positions"
     coefficients = (
         Coefficient("share", "1", "share of the motion that is missing", "such a filter would amplify the motion"),
+        *SmoothedPositions.coefficients,
     )
     # As far as those of a link that swings.
     nonlinear = (
         NonlinearParameter("frequency", "Hz", 2.0, 200.0),
-        NonlinearParameter("_damping_ratio", "1", 0.01, 0.7),
+        NonlinearParameter("_damping_ratio", "1", 0.01, WIDEST),
     )
+
+    def inadmissible(self, scene: Scene, member: Member, value: Array, std: Array) -> str | None:
+        """Return the reason too if there is no frequency at which it leaves nothing."""
+        if member.nonlinear[1] >= AS_WIDE * WIDEST:
+            return "such a filter would leave motion at all frequencies"
+        return super().inadmissible(scene, member, value, std)
+
+    def members(self, scene: Scene) -> tuple[Member, ...]:
+        """Return some within the band and about it; further away the powers do as well."""
+        return tuple(Member(None, (float(ratio) * scene.band, NULL_DAMPING)) for ratio in NULLS)
 
     def in_place_of(self, scene: Scene, effect: Effect, member: Member, value: Array) -> Member | None:
         """Return one of what swings, with nothing left at its frequency."""
-        return Member(None, member.nonlinear) if len(member.nonlinear) == len(self.nonlinear) else None
+        if len(member.nonlinear) != len(self.nonlinear):
+            return None
+        frequency, ratio = member.nonlinear
+        return Member(None, (frequency, min(ratio, WIDEST)))
 
     def gains(self, scene: Scene, member: Member) -> Iterable[Gain]:
-        """Give the swing's."""
+        """Give the swing's, and the powers."""
         null, ratio = member.nonlinear
 
         def gain(frequency: Array) -> Array:
             square = (frequency / null) ** 2
             return square * (1.0 - square) / ((1.0 - square) ** 2 + 4.0 * ratio**2 * square)
 
-        return (gain,)
+        return (gain, *(_power(power, scene.band) for power in POWERS))
 
 
 def _power(power: int, band: float) -> Gain:
